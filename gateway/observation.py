@@ -1,0 +1,158 @@
+"""What sensors said, in their own coordinates, never corrected.
+
+Every observation has `valid_at` (when it was so, by its source's clock) and `received_at` (when we heard), both ns since
+1970 UTC. Not measured is None.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Timing(Enum):
+    """How far an observation's `valid_at` can be trusted, and so what it may be fused with."""
+
+    UTC = "utc"  # the source's own UTC, or a radar's header time
+    ENVELOPE = "envelope"  # no UTC for 15 s: lower envelope of (received - boot); fused, with this said
+    PROVISIONAL = "provisional"  # no UTC yet: shown, not fused with others
+    FOREIGN = "foreign"  # more than 5 s from the session's time: shown, not fused, named
+
+
+@dataclass(frozen=True, slots=True)
+class GpsReport:
+    """A position that an aircraft reported of itself.
+
+    Altitude above mean sea level, height above the ellipsoid, or both. Sigmas are None when the stream gives none.
+    """
+
+    aircraft: str
+    valid_at: int
+    received_at: int
+    latitude_rad: float
+    longitude_rad: float
+    altitude_msl_m: float | None = None
+    height_m: float | None = None
+    velocity_east_mps: float | None = None
+    velocity_north_mps: float | None = None
+    velocity_up_mps: float | None = None
+    horizontal_sigma_m: float | None = None
+    vertical_sigma_m: float | None = None
+    velocity_sigma_mps: float | None = None
+    compass_heading_rad: float | None = None  # where the nose points, clockwise from true north
+    timing: Timing = Timing.UTC
+
+
+@dataclass(frozen=True, slots=True)
+class RadarPlot:
+    """One detection of a radar, in its own frame; any component may be missing. Track number 0: not tracked by the radar."""
+
+    radar: int
+    track_number: int
+    valid_at: int
+    received_at: int
+    range_m: float | None = None
+    azimuth_rad: float | None = None
+    elevation_rad: float | None = None
+    radial_velocity_mps: float | None = None  # positive: receding
+    snr_db: float | None = None
+    range_sigma_m: float | None = None
+    azimuth_sigma_rad: float | None = None
+    elevation_sigma_rad: float | None = None
+    simulated: bool = False
+    timing: Timing = Timing.UTC
+
+
+@dataclass(frozen=True, slots=True)
+class RadarStatus:
+    """What a radar says of itself."""
+
+    radar: int
+    valid_at: int
+    received_at: int
+    state: str  # "off", "standby", "operating", "fault"
+    mode: str  # "search", "precision approach"
+    update_period_s: float
+    latitude_rad: float
+    longitude_rad: float
+    height_m: float
+    compass_boresight_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class Attitude:
+    """Roll, pitch, yaw (yaw clockwise from true north; pitch nose up; roll right wing down)."""
+
+    aircraft: str
+    valid_at: int
+    received_at: int
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleStatus:
+    """What a vehicle says of itself: its kind, whether it is armed, its mode as a number of its autopilot."""
+
+    aircraft: str
+    valid_at: int
+    received_at: int
+    vehicle_type: int
+    autopilot: int
+    armed: bool
+    custom_mode: int
+
+
+@dataclass(frozen=True, slots=True)
+class FlightPlan:
+    """Points that a vehicle has said, or was told, that it will pass; home comes as the sequence number 0."""
+
+    aircraft: str
+    valid_at: int
+    received_at: int
+    points: tuple[PlanPoint, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PlanPoint:
+    """One point of a flight plan. The altitude is above mean sea level when `altitude_msl_m`, else above home."""
+
+    sequence: int
+    kind: str  # "home", "waypoint", "loiter", "take-off", "landing", "other"
+    latitude_rad: float
+    longitude_rad: float
+    altitude_msl_m: float | None = None
+    altitude_above_home_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """Where a simulator says the aircraft really is. Archived, drawn and scored against; never reaches a stage."""
+
+    aircraft: str
+    valid_at: int
+    received_at: int
+    latitude_rad: float
+    longitude_rad: float
+    altitude_msl_m: float | None = None
+    height_m: float | None = None
+    velocity_east_mps: float | None = None
+    velocity_north_mps: float | None = None
+    velocity_up_mps: float | None = None
+    mode: str | None = None
+
+
+Observation = GpsReport | RadarPlot | RadarStatus | Attitude | VehicleStatus | FlightPlan | Truth
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """One arrival, decoded: the unit of work of the pipeline.
+
+    `now` is the session's time of the arrival: its stamp plus the session's epoch offset. A Heard without observations is
+    the receiver's watermark: nothing that was stamped at or before `now` is still to come.
+    """
+
+    now: int
+    observations: tuple[Observation, ...] = ()
