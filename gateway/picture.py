@@ -1,0 +1,62 @@
+"""The picture: everything that a step of the pipeline found. Sinks see nothing else, so a sink cannot change a number."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gateway.align import Aligned
+from gateway.associate import Associated
+from gateway.fuse import Fused
+from gateway.observation import Observation, Truth
+from gateway.predict import Predicted
+from gateway.register import Registered
+from gateway.track import Tracked
+
+
+@dataclass(frozen=True, slots=True)
+class SourceHealth:
+    """How one source is doing. `counters` are totals by reason, such as ("crc error", 3)."""
+
+    name: str
+    kind: str  # "mavlink", "radar"
+    age_s: float  # since it was last heard
+    rate_hz: float  # observations a second, over the last 10 s
+    lost: int
+    counters: tuple[tuple[str, int], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """The state of every source and of the gateway itself."""
+
+    sources: tuple[SourceHealth, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that a person should read once. Level: "info", "warning", "error"."""
+
+    at: int  # session time, ns
+    level: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """One step's results, in the order of the data path, and what went in.
+
+    `now` is the session's time of the step (ns since 1970 UTC); `step` counts from 0.
+    """
+
+    step: int
+    now: int
+    observations: tuple[Observation, ...]
+    align: Aligned
+    track: Tracked
+    associate: Associated
+    register: Registered
+    fuse: Fused
+    predict: Predicted
+    truth: tuple[Truth, ...]
+    health: Health
+    events: tuple[Event, ...]
