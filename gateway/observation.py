@@ -151,8 +151,10 @@ class Heard:
     """One arrival, decoded: the unit of work of the pipeline.
 
     `now` is the session's time of the arrival: its stamp plus the session's epoch offset. A Heard without observations is
-    the receiver's watermark: nothing that was stamped at or before `now` is still to come.
+    the receiver's watermark: nothing that was stamped at or before `now` is still to come. `notes` are what the decoder
+    found worth telling a person once, as (level, text); they become the picture's events.
     """
 
     now: int
     observations: tuple[Observation, ...] = ()
+    notes: tuple[tuple[str, str], ...] = ()
