@@ -1,0 +1,142 @@
+"""The extended Kalman filter of one aircraft and its position source: constant velocity, and a slowly varying source error.
+
+State, nine numbers: position (east, north, up at the runway centre, m), velocity (m/s), and the position source's own
+error (m). With no error allowed its covariance is zero and the filter is the plain constant-velocity one.
+
+Every function works on n tracks at once with stacked 9 x 9 products, in which no track is a matrix axis: the bits of one
+track do not depend on how many come along.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+SIZE = 9
+POSITION, VELOCITY, ERROR = slice(0, 3), slice(3, 6), slice(6, 9)
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """n Gaussian states: mean (n, 9), covariance (n, 9, 9), symmetric."""
+
+    mean: Floats
+    covariance: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Innovation:
+    """What m-dimensional measurements told n tracks: innovation (n, m), its covariance (n, m, m), which were measured (n, m).
+
+    Components that were not measured have innovation 0 and unit variance, so that they add nothing anywhere.
+    """
+
+    innovation: Floats
+    covariance: Floats
+    measured: Bools
+    normalised: Floats  # (n,) squared, y' S^-1 y, chi-square with as many degrees as were measured
+
+    @property
+    def log_likelihood(self) -> Floats:
+        """Natural logarithm of the density of the measured components, (n,)."""
+        _, log_determinant = np.linalg.slogdet(self.covariance)
+        degrees = self.measured.sum(axis=-1)
+        return np.asarray(-0.5 * (self.normalised + log_determinant + degrees * np.log(2.0 * np.pi)))
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """How the state moves: white acceleration, and a source error that forgets with a time constant (Gauss-Markov)."""
+
+    acceleration_density: float  # m2/s3 an axis: the variance of velocity grows by this each second
+    error_sigma_m: float  # an axis; 0 = the position source is taken to have no constant error
+    error_time_constant_s: float = 36000.0
+
+
+def predict(state: Estimate, elapsed_s: Floats, motion: Motion) -> Estimate:
+    """The states `elapsed_s` (n,) later. White-noise acceleration, so that two short steps equal one long one.
+
+    Source: 003 2.4 eq 17, 18.
+    """
+    t = elapsed_s[:, None]
+    keep = np.exp(-np.abs(t) / motion.error_time_constant_s)
+    mean = state.mean.copy()
+    mean[:, POSITION] += t * state.mean[:, VELOCITY]
+    mean[:, ERROR] *= keep
+    p, t, keep = state.covariance, t[:, :, None], keep[:, :, None]
+    covariance = p.copy()
+    # F P F' by blocks: three cheap sums instead of two products with a matrix that is mostly zeros.
+    covariance[:, POSITION] += t * p[:, VELOCITY]
+    covariance[:, ERROR] *= keep
+    carried = covariance.copy()
+    carried[:, :, POSITION] += t * covariance[:, :, VELOCITY]
+    carried[:, :, ERROR] *= keep
+    q = motion.acceleration_density
+    span = np.abs(elapsed_s)[:, None]
+    axis = np.arange(3)
+    carried[:, axis, axis] += q * span * span * span / 3.0
+    carried[:, axis, axis + 3] += q * span * elapsed_s[:, None] / 2.0
+    carried[:, axis + 3, axis] += q * span * elapsed_s[:, None] / 2.0
+    carried[:, axis + 3, axis + 3] += q * span
+    carried[:, axis + 6, axis + 6] += motion.error_sigma_m**2 * (1.0 - keep[:, :, 0] * keep[:, :, 0])
+    return Estimate(mean, carried)
+
+
+def update(
+    state: Estimate, innovation: Floats, sensitivity: Floats, variance: Floats, robust: float | None = None
+) -> tuple[Estimate, Innovation]:
+    """One measurement for each of n tracks; components that are NaN in `innovation` (n, m) are left out.
+
+    `sensitivity` (n, m, 9) is the measurement's derivative by the state, `variance` (n, m) of independent noise. With
+    `robust` (a number of sigmas for each degree of freedom), a measurement further out than that has its noise raised
+    until it is just there (Huber's weight): an outlier pulls no more than a bounded amount, and a source that really has
+    jumped is followed all the same.
+    Joseph's form: the covariance stays symmetric and positive whatever the rounding.
+    Source: 003 2.4 eq 19, 20.
+    """
+    measured = ~np.isnan(innovation)
+    y = np.where(measured, innovation, 0.0)
+    h = np.where(measured[:, :, None], sensitivity, 0.0)
+    r = np.where(measured, variance, 1.0)
+    cross = state.covariance @ h.transpose(0, 2, 1)
+    axis = np.arange(y.shape[1])
+    predicted = h @ cross
+    s = predicted.copy()
+    s[:, axis, axis] += r
+    inverse = np.linalg.inv(s)
+    normalised = np.maximum((y[:, None, :] @ inverse @ y[:, :, None])[:, 0, 0], 0.0)
+    if robust is not None:
+        limit = robust * robust * np.maximum(measured.sum(axis=1), 1)
+        far = normalised > limit
+        if far.any():
+            factor = np.where(far, normalised / limit, 1.0)[:, None]
+            # S must grow by the factor, not R: a confident prediction would otherwise hold out for ever.
+            r = np.where(measured, r + (factor - 1.0) * s[:, axis, axis], 1.0)
+            s = predicted
+            s[:, axis, axis] += r
+            inverse = np.linalg.inv(s)
+    gain = cross @ inverse
+    mean = state.mean + (gain @ y[:, :, None])[:, :, 0]
+    reduced = -(gain @ h)
+    diagonal = np.arange(SIZE)
+    reduced[:, diagonal, diagonal] += 1.0
+    covariance = reduced @ state.covariance @ reduced.transpose(0, 2, 1) + (gain * r[:, None, :]) @ gain.transpose(0, 2, 1)
+    covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))
+    return Estimate(mean, covariance), Innovation(y, s, measured, normalised)
+
+
+def start(position: Floats, position_covariance: Floats, velocity: Floats, velocity_sigma: Floats, error_sigma_m: float) -> Estimate:
+    """First states of n tracks from a position (n, 3) with covariance (n, 3, 3) and a velocity (n, 3), sigma (n,)."""
+    n = position.shape[0]
+    mean = np.concatenate([position, velocity, np.zeros((n, 3))], axis=1)
+    covariance = np.zeros((n, SIZE, SIZE))
+    covariance[:, POSITION, POSITION] = position_covariance
+    axis = np.arange(3)
+    covariance[:, axis + 3, axis + 3] = (velocity_sigma * velocity_sigma)[:, None]
+    covariance[:, axis + 6, axis + 6] = error_sigma_m * error_sigma_m
+    return Estimate(mean, covariance)
