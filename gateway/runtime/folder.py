@@ -1,0 +1,151 @@
+"""A session's folder: session.json and the names beside it (the layout stands in docs and in every session.json's reader).
+
+session.json is always whole: it is written beside itself and renamed. It is written at the start, each time the session's
+files are flushed, and at the end, so that the folder of a killed session says nearly everything.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal, cast
+
+from adapters import Source
+from gateway.settings import Options
+
+SESSION_FILE = "session.json"
+INPUTS = "inputs"
+FORMAT = 1
+
+
+class FolderError(ValueError):
+    """A folder that cannot be used as, or is no session; the message is one plain sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class InputFile:
+    """One source of a session and the file that holds what it sent."""
+
+    number: int
+    kind: Literal["mavlink", "radar"]
+    name: str
+    origin: str
+    file: str  # relative to the session's folder
+    arrivals: int = 0
+    refused: int = 0
+
+    @property
+    def source(self) -> Source:
+        """The source as it was live."""
+        return Source(self.number, self.kind, self.name, self.origin)
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """What session.json says. Instants are ns since 1970 UTC by the receiver's clock; `ended` is None while it runs."""
+
+    version: str
+    command: tuple[str, ...]
+    options: Options
+    started_at: int
+    site: str | None = None  # the site file's text
+    site_origin: str = ""
+    epoch_offset_s: int | None = None
+    registration: None = None  # what was known of the radars' errors at the start; later issues fill it
+    flows: None = None
+    sources: tuple[InputFile, ...] = ()
+    counters: Mapping[str, int] = field(default_factory=dict)
+    watermark: int | None = None
+    ended: str | None = None  # "done", "interrupted", "failed: ...", "killed"
+    summary: Mapping[str, Any] = field(default_factory=dict)
+
+
+def session_name(started_at: int, name: str) -> str:
+    """A folder's name: when it began (UTC) and where."""
+    moment = datetime.fromtimestamp(started_at // 1_000_000_000, UTC)
+    words = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower()[:40]
+    return f"{moment:%Y%m%dT%H%M%SZ}" + (f"-{words}" if words else "")
+
+
+def make_folder(parent: Path, name: str) -> Path:
+    """A new folder for one session inside `parent`, with room for its inputs.
+
+    Raises FolderError when `parent` is a session itself, is no folder or cannot be written.
+    """
+    if (parent / SESSION_FILE).exists():
+        raise FolderError(f"{parent} is a session already; name the folder that sessions are kept in, such as {parent.parent}.")
+    try:
+        parent.mkdir(parents=True, exist_ok=True)
+        for attempt in range(1, 1000):
+            folder = parent / (name if attempt == 1 else f"{name}-{attempt}")
+            try:
+                folder.mkdir()
+            except FileExistsError:
+                continue
+            (folder / INPUTS).mkdir()
+            return folder
+    except FileExistsError as error:
+        raise FolderError(f"{parent} is a file; --archive needs a folder, which is made if it does not exist.") from error
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise FolderError(f"{parent} cannot be written to ({reason}); choose another folder for --archive.") from error
+    raise FolderError(f"{parent} holds 1000 sessions of this second; choose another folder for --archive.")
+
+
+def write_record(folder: Path, record: Record) -> None:
+    """Put session.json in its place, whole. Raises OSError."""
+    document: dict[str, Any] = {"format": FORMAT, **asdict(record)}
+    document["started"] = _readable(record.started_at)
+    document["watermark_utc"] = None if record.watermark is None else _readable(record.watermark)
+    beside = folder / (SESSION_FILE + ".part")
+    beside.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    os.replace(beside, folder / SESSION_FILE)
+
+
+def read_record(folder: Path) -> Record:
+    """What the session.json of a folder says.
+
+    Raises FolderError when there is none, or it is none of ours.
+    """
+    path = folder / SESSION_FILE
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise FolderError(f"{folder} is no session: it has no {SESSION_FILE}.") from error
+    except (OSError, ValueError) as error:
+        raise FolderError(f"{path} cannot be read ({error}); the session's inputs can still be replayed one by one.") from error
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise FolderError(f"{path} is not of a format that this version of Talkdown knows.")
+    try:
+        return _record(document)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise FolderError(f"{path} lacks or spoils what a session needs ({error}).") from error
+
+
+def _record(document: dict[str, Any]) -> Record:
+    known = {name.name for name in fields(Record)}
+    plain = {key: value for key, value in document.items() if key in known}
+    plain["command"] = tuple(document["command"])
+    plain["options"] = read_options(document["options"])
+    plain["sources"] = tuple(_input_file(row) for row in document["sources"])
+    return Record(**plain)
+
+
+def _input_file(row: dict[str, Any]) -> InputFile:
+    known = {name.name for name in fields(InputFile)}
+    return InputFile(**{key: value for key, value in row.items() if key in known})
+
+
+def read_options(stored: Mapping[str, Any]) -> Options:
+    """Options as they were archived; those that this version does not know are an error of its reader's, not silent."""
+    values = {key: tuple(value) if isinstance(value, list) else value for key, value in stored.items()}
+    return replace(Options(), **cast("dict[str, Any]", values))
+
+
+def _readable(instant: int) -> str:
+    return datetime.fromtimestamp(instant / 1e9, UTC).isoformat(timespec="milliseconds")

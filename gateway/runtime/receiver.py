@@ -1,0 +1,137 @@
+"""The one receiving thread: drains the links, stamps what came and hands it over through a bounded queue.
+
+What does not fit into the queue is counted, never silent; what is handed over stays in the order of its stamps. A
+watermark comes with every hand-over: nothing that was stamped at or before it is still to come.
+"""
+
+from __future__ import annotations
+
+import selectors
+import threading
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from adapters import Arrival, Source
+from gateway.runtime.intake import Intake
+from gateway.runtime.links import Link
+from gateway.runtime.stamps import Stamper
+
+_WAIT_S = 0.01  # how long the thread waits for bytes before it looks at its links and moves the watermark
+_LAST_TURNS = 100  # what the kernel still holds at the end, but never a peer that sends without pause
+QUEUE_ARRIVALS = 200_000  # some 60 MB, and 20 s of the fastest stream measured
+
+
+@dataclass(frozen=True, slots=True)
+class Delivery:
+    """What came since the last hand-over. `notes` are (level, text), to be told to a person once."""
+
+    watermark: int
+    sources: tuple[Source, ...] = ()
+    arrivals: list[Arrival] = field(default_factory=list)
+    notes: tuple[tuple[str, str], ...] = ()
+
+
+class Receiver:
+    """Owns the links from `start` to `close`; `drain` may be called from one other thread."""
+
+    def __init__(
+        self,
+        mavlink: Sequence[Link],
+        radar: Sequence[Link],
+        *,
+        stamper: Stamper | None = None,
+        capacity: int = QUEUE_ARRIVALS,
+    ) -> None:
+        self._links = [*mavlink, *radar]
+        self._stamper = stamper or Stamper()
+        self._intake = Intake(self._stamper, [str(link.url) for link in mavlink], [str(link.url) for link in radar])
+        self._capacity = capacity
+        self._lock = threading.Lock()
+        self._closing = threading.Event()
+        self._failure: BaseException | None = None
+        self._overflow = 0
+        self._overflow_told = False
+        self._new_sources: list[Source] = []
+        self._arrivals: list[Arrival] = []
+        self._notes: list[tuple[str, str]] = []
+        self.started_at = self._watermark = self._stamper.watermark()  # before the first arrival, ns since 1970 UTC
+        self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
+
+    def start(self) -> None:
+        """Begin to receive."""
+        self._thread.start()
+
+    def drain(self) -> Delivery:
+        """What came since the last call. Raises what ended the receiving thread, if something did."""
+        if self._failure is not None:
+            raise self._failure
+        with self._lock:
+            delivery = Delivery(self._watermark, tuple(self._new_sources), self._arrivals, tuple(self._notes))
+            self._new_sources, self._arrivals, self._notes = [], [], []
+        return delivery
+
+    def close(self) -> None:
+        """Stop receiving, take in what the kernel still holds, and let go of the ports; `drain` once more after this."""
+        self._closing.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        for link in self._links:
+            link.close()
+
+    def counters(self) -> dict[str, int]:
+        """Everything that was lost or odd before decoding, by link and reason."""
+        counted: Counter[str] = Counter(self._intake.counters)
+        for link in self._links:
+            for reason, number in link.counters.items():
+                counted[f"{link.url} {reason}"] += number
+        if self._overflow:
+            counted["queue overflow"] = self._overflow
+        return {reason: number for reason, number in sorted(counted.items()) if number}
+
+    def _run(self) -> None:
+        try:
+            while not self._closing.is_set():
+                self._turn(_WAIT_S)
+            for _ in range(_LAST_TURNS):
+                if not self._turn(0.0):
+                    break
+        except BaseException as error:  # raised again by drain, in the thread that can end the session
+            self._failure = error
+
+    def _turn(self, wait_s: float) -> int:
+        """Wait for bytes, take in what all links have, move the watermark; how many chunks came."""
+        now_ns = time.monotonic_ns()
+        for link in self._links:
+            link.tend(now_ns)
+        self._wait(wait_s)
+        heard = [(number, chunk) for number, link in enumerate(self._links) for chunk in link.receive()]
+        sources, arrivals = self._intake.take(heard)
+        notes = [note for link in self._links for note in link.news]
+        for link in self._links:
+            link.news.clear()
+        with self._lock:
+            self._new_sources += sources
+            room = self._capacity - len(self._arrivals)
+            self._arrivals += arrivals[: max(room, 0)]
+            if len(arrivals) > room:
+                self._overflow += len(arrivals) - max(room, 0)
+                if not self._overflow_told:
+                    self._overflow_told = True
+                    notes.append(("error", "This machine is too slow for what comes in: arrivals are being lost (counted)."))
+            self._notes += notes
+            self._watermark = self._stamper.watermark()
+        return len(heard)
+
+    def _wait(self, wait_s: float) -> None:
+        # A selector a turn costs 20 us and follows links that close and come back without any book-keeping.
+        with selectors.DefaultSelector() as selector:
+            for link in self._links:
+                descriptor = link.fileno()
+                if descriptor is not None:
+                    selector.register(descriptor, selectors.EVENT_READ)
+            if selector.get_map():
+                selector.select(wait_s)
+            else:
+                time.sleep(wait_s)
