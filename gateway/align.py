@@ -1,14 +1,59 @@
-"""Align: what was said, brought into the site's frames, and radar brought to the time of a GPS report."""
+"""Align: what was said, brought into the site's frames, and radar brought to the time of a GPS report.
+
+Positions of reports and plots become `Fix` and `Plot`: metres at the runway centre, and polar at the radar with what
+`register` learnt taken off. `bracket` interpolates a radar track at a GPS report's time, each component on its own.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.frames import RadarFrame, RunwayFrame, turn, xyz_from_polar
+from gateway.geodesy import geodetic_to_ecef
+from gateway.observation import GpsReport, RadarPlot, RadarStatus, Timing
+from gateway.settings import RadarSite, Site
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+SECOND = 1_000_000_000
+LEAST_POSITION_SIGMA_M = 0.3  # a receiver that claims less is describing its noise, not its error
+LEAST_VELOCITY_SIGMA_MPS = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fix:
+    """A GPS report in the runway's ENU. Ordered by (at, aircraft, serial)."""
+
+    at: int
+    serial: int
+    received_at: int
+    aircraft: str
+    enu_m: Floats  # (3,)
+    sigma_m: Floats  # (3,) east, north, up
+    velocity_mps: Floats  # (3,) in the runway's ENU, NaN = not measured
+    velocity_sigma_mps: float
+    comparable: bool  # its clock allows to compare it with other sources
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plot:
+    """A radar plot, corrected: range m, azimuth rad, elevation rad, NaN = not measured."""
+
+    at: int
+    serial: int
+    received_at: int
+    radar: int
+    number: int
+    polar: Floats  # (3,)
+    sigma: Floats  # (3,)
+    begins: bool = False  # a plot completed from its neighbours, from which a track starts
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,3 +66,153 @@ class Aligned:
     plot_radar_track: tuple[str, ...]  # "1/3"; "1/0" is a plot that the radar does not track
     plot_time: Ints  # (m,) ns
     plot_runway_m: Floats  # (m, 3)
+
+
+@dataclass(frozen=True, slots=True)
+class Geoid:
+    """The geoid's height above the ellipsoid here: the site's word, else the median of what the streams gave, else 0."""
+
+    site_m: float | None
+    seen_m: tuple[float, ...] = ()
+
+    KEEP = 101  # odd, and enough that one wrong report does not move the median
+
+    @property
+    def separation_m(self) -> float:
+        """What is added to an altitude above mean sea level to give a height above the ellipsoid."""
+        if self.site_m is not None:
+            return self.site_m
+        return median(self.seen_m) if self.seen_m else 0.0
+
+    @property
+    def contradiction_m(self) -> float:
+        """How far the streams' separation is from the site's, 0 where either is not given."""
+        return median(self.seen_m) - self.site_m if self.site_m is not None and self.seen_m else 0.0
+
+    def learn(self, report: GpsReport) -> Geoid:
+        """The same with a report's own separation noted, if it gives both heights."""
+        if report.height_m is None or report.altitude_msl_m is None or len(self.seen_m) >= self.KEEP:
+            return self
+        return Geoid(self.site_m, (*self.seen_m, report.height_m - report.altitude_msl_m))
+
+    def height_m(self, report: GpsReport) -> float:
+        """Height above the ellipsoid of a report; the site's separation wins over the stream's own height."""
+        if report.altitude_msl_m is not None and (self.site_m is not None or report.height_m is None):
+            return report.altitude_msl_m + self.separation_m
+        return report.height_m if report.height_m is not None else math.nan
+
+
+def place_reports(reports: Sequence[GpsReport], heights_m: Sequence[float], serials: Sequence[int], site: Site, frame: RunwayFrame) -> list[Fix]:
+    """GPS reports as fixes; all reports of a step in one call, since arrays of one cost as much as arrays of a hundred.
+
+    Source: 003 2.2 eq 1, 2.
+    """
+    if not reports:
+        return []
+    latitude = np.array([report.latitude_rad for report in reports])
+    longitude = np.array([report.longitude_rad for report in reports])
+    ecef = geodetic_to_ecef(latitude, longitude, np.array(heights_m))
+    enu = turn(frame.enu_from_ecef, ecef - frame.origin_ecef_m)
+    nan = math.nan
+    local = np.array(
+        [
+            [
+                nan if report.velocity_east_mps is None else report.velocity_east_mps,
+                nan if report.velocity_north_mps is None else report.velocity_north_mps,
+                nan if report.velocity_up_mps is None else report.velocity_up_mps,
+            ]
+            for report in reports
+        ]
+    )
+    # A component alone cannot be turned into the runway's axes; such a velocity counts as not measured.
+    velocity = (frame.local_from_enu(latitude, longitude).transpose(0, 2, 1) @ local[:, :, None])[:, :, 0]
+    fixes = []
+    for row, report in enumerate(reports):
+        level = report.horizontal_sigma_m or site.position.sigma_m
+        upright = report.vertical_sigma_m or report.horizontal_sigma_m or site.position.sigma_m
+        sigma = np.maximum(np.array([level, level, upright]), LEAST_POSITION_SIGMA_M)
+        speed = max(report.velocity_sigma_mps or site.position.velocity_sigma_mps, LEAST_VELOCITY_SIGMA_MPS)
+        comparable = report.timing in (Timing.UTC, Timing.ENVELOPE)
+        fixes.append(
+            Fix(report.valid_at, serials[row], report.received_at, report.aircraft, enu[row], sigma, velocity[row], speed, comparable)
+        )
+    return fixes
+
+
+def place_plot(plot: RadarPlot, serial: int, radar: RadarSite, correction: Floats) -> Plot:
+    """A plot with its radar's correction taken off and the site's sigmas where it gives none."""
+    nan = math.nan
+    polar = np.array(
+        [
+            nan if plot.range_m is None else plot.range_m,
+            nan if plot.azimuth_rad is None else plot.azimuth_rad,
+            nan if plot.elevation_rad is None else plot.elevation_rad,
+        ]
+    )
+    sigma = np.array(
+        [
+            plot.range_sigma_m or radar.range_sigma_m,
+            plot.azimuth_sigma_rad or radar.azimuth_sigma_rad,
+            plot.elevation_sigma_rad or radar.elevation_sigma_rad,
+        ]
+    )
+    return Plot(plot.valid_at, serial, plot.received_at, plot.radar, plot.track_number, polar - correction, sigma)
+
+
+def radar_from_status(status: RadarStatus, frame: RunwayFrame) -> RadarSite:
+    """Where a radar says it stands, as a radar of the site file."""
+    x, y, z = frame.runway_from_geodetic(status.latitude_rad, status.longitude_rad, status.height_m).tolist()
+    return RadarSite(status.radar, x, y, z, status.compass_boresight_rad)
+
+
+def bracket(plots: Sequence[Plot], at: int, wait_s: float, back_s: float = 3.0) -> tuple[Floats, Floats]:
+    """Range, azimuth, elevation of one radar track at an instant, (3,) and sigmas (3,); NaN where nothing is near.
+
+    `plots` in order of time. Each component is interpolated between the plots on both sides that have it (no later than
+    `wait_s` after the instant, no earlier than `back_s` before); extrapolated from the two before it if none follows.
+    Sigmas are those of the weights used, so an extrapolation says how bad it is (2.2 to 2.6 times an interpolation).
+    Source: 003 2.1.
+    """
+    first, last = at - int(back_s * SECOND), at + int(wait_s * SECOND)
+    near = [plot for plot in plots if first <= plot.at <= last]
+    value, sigma = np.full(3, math.nan), np.full(3, math.nan)
+    for component in range(3):
+        having = [plot for plot in near if not math.isnan(plot.polar[component])]
+        before = [plot for plot in having if plot.at <= at]
+        after = next((plot for plot in having if plot.at > at), None)
+        if not before:
+            continue
+        if before[-1].at == at or (after is None and len(before) < 2):
+            if at - before[-1].at > SECOND // 2:
+                continue  # one old plot alone does not say where the target is now
+            value[component], sigma[component] = before[-1].polar[component], before[-1].sigma[component]
+            continue
+        one, other = (before[-1], after) if after is not None else (before[-2], before[-1])
+        if one.at == other.at:
+            continue
+        weight = (at - one.at) / (other.at - one.at)
+        change = other.polar[component] - one.polar[component]
+        if component == 1:
+            change = math.remainder(change, 2.0 * math.pi)
+        value[component] = one.polar[component] + weight * change
+        sigma[component] = math.hypot((1.0 - weight) * one.sigma[component], weight * other.sigma[component])
+    return value, sigma
+
+
+def draw(fixes: Sequence[Fix], plots: Sequence[Plot], frame: RunwayFrame, radars: Mapping[int, RadarFrame]) -> Aligned:
+    """The fixes and plots of a step as columns in the runway frame."""
+    report_m = np.array([fix.enu_m for fix in fixes]).reshape(-1, 3)
+    plot_m = np.full((len(plots), 3), math.nan)
+    for number, radar in radars.items():
+        rows = [row for row, plot in enumerate(plots) if plot.radar == number]
+        if rows:
+            polar = np.array([plots[row].polar for row in rows])
+            plot_m[rows] = turn(frame.runway_from_enu, radar.to_enu(xyz_from_polar(polar)))
+    return Aligned(
+        report_aircraft=tuple(fix.aircraft for fix in fixes),
+        report_time=np.array([fix.at for fix in fixes], dtype=np.int64),
+        report_runway_m=turn(frame.runway_from_enu, report_m),
+        plot_radar_track=tuple(f"{plot.radar}/{plot.number}" for plot in plots),
+        plot_time=np.array([plot.at for plot in plots], dtype=np.int64),
+        plot_runway_m=plot_m,
+    )

@@ -1,14 +1,22 @@
-"""Track: which plots belong together. The radar's own numbers decide; plots without one wait for a later method."""
+"""Track: which plots belong together. The radar's own numbers decide; plots without one wait for a later method.
+
+A number can be used again for another target: a plot that its predecessor cannot have reached begins a new episode of the
+number, and so does a long silence. A radar track is a (radar, number, episode).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from bisect import bisect_right
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
-import numpy as np
-from numpy.typing import NDArray
+from gateway.align import SECOND, Plot
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+GREATEST_SPEED_MPS = 600.0  # beyond any aircraft that a landing radar meets
+GREATEST_SILENCE_S = 10.0
+
+Key = tuple[int, int, int]  # radar, number, episode
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,3 +25,64 @@ class Tracked:
 
     active: tuple[str, ...]  # "1/3": radar 1, track 3
     untracked: int
+
+
+@dataclass(frozen=True, slots=True)
+class RadarTracks:
+    """The recent plots of every radar track, in order of time."""
+
+    plots: Mapping[Key, tuple[Plot, ...]] = field(default_factory=dict)
+    episode: Mapping[tuple[int, int], int] = field(default_factory=dict)  # the present one of each number
+
+    def after(self, plot: Plot) -> tuple[RadarTracks, Key]:
+        """The same with one more plot, wherever in time it belongs; and the radar track that took it."""
+        number = (plot.radar, plot.number)
+        present = self.episode.get(number, 0)
+        key = (*number, present)
+        known = self.plots.get(key, ())
+        episodes = self.episode
+        if known and plot.at > known[-1].at and _is_another_target(known, plot):
+            key, known = (*number, present + 1), ()
+            episodes = {**episodes, number: present + 1}
+        elif known and plot.at < known[0].at and present and (*number, present - 1) in self.plots:
+            key = (*number, present - 1)
+            known = self.plots[key]
+        elif number not in episodes:
+            episodes = {**episodes, number: present}
+        place = bisect_right(known, (plot.at, plot.serial), key=lambda other: (other.at, other.serial))
+        return RadarTracks({**self.plots, key: (*known[:place], plot, *known[place:])}, episodes), key
+
+    def pruned(self, before: int) -> RadarTracks:
+        """The same without plots older than an instant; tracks without plots are forgotten."""
+        if all(plots[0].at >= before for plots in self.plots.values()):
+            return self
+        kept = {key: tuple(plot for plot in plots if plot.at >= before) for key, plots in self.plots.items()}
+        return replace(self, plots={key: plots for key, plots in kept.items() if plots})
+
+
+def name_of(key: Key) -> str:
+    """How people write a radar track: "1/3" is radar 1, track 3."""
+    return f"{key[0]}/{key[1]}"
+
+
+def _is_another_target(known: tuple[Plot, ...], plot: Plot) -> bool:
+    """Whether no aircraft can have flown from the last plots to this one."""
+    elapsed_s = (plot.at - known[-1].at) / SECOND
+    if elapsed_s > GREATEST_SILENCE_S:
+        return True
+    distance_m = next((p.polar[0] for p in (plot, *reversed(known[-5:])) if not math.isnan(p.polar[0])), math.nan)
+    for component in range(3):
+        if math.isnan(plot.polar[component]):
+            continue
+        last = next((p for p in reversed(known[-5:]) if not math.isnan(p.polar[component])), None)
+        if last is None:
+            continue
+        moved = plot.polar[component] - last.polar[component]
+        if component == 1:
+            moved = math.remainder(moved, 2.0 * math.pi)
+        possible = GREATEST_SPEED_MPS * (plot.at - last.at) / SECOND
+        if component:  # an angle: what that distance subtends, known only with a range
+            possible = math.pi if math.isnan(distance_m) else possible / max(distance_m, 100.0)
+        if abs(moved) > possible + 8.0 * math.hypot(plot.sigma[component], last.sigma[component]):
+            return True
+    return False
