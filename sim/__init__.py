@@ -1,1 +1,1 @@
-"""A world that speaks the real wires: aircraft as MAVLink, a radar as landing-radar datagrams, the papers' experiments."""
+"""A world that speaks the real wires: aircraft as MAVLink, radars as landing-radar datagrams; papers' studies."""
