@@ -25,3 +25,4 @@ class Arrival:
     received_at: int
     source: int
     data: bytes
+    peer: str = ""  # who sent it ("host:port"), on a link that hears several; kept in a session's .pcap

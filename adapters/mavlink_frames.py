@@ -1,0 +1,270 @@
+"""MAVLink frames: found in bytes, checked, taken apart, and made. Definitions are pymavlink's own tables (dialect "all").
+
+    v2   FD length incompat compat sequence system component id[3] payload checksum[2] (signature[13] if incompat bit 0)
+    v1   FE length sequence system component id payload checksum[2]
+
+Little-endian. Checksum: CRC-16/MCRF4XX over everything after the magic and before the checksum, then over the message's CRC
+extra. v2 cuts trailing zeros of the payload; v1 carries no extensions: a payload is padded with zeros, surplus is ignored.
+
+A frame whose id is not known, or whose definition differs from ours, cannot be checked against its CRC extra. But the
+checksum itself tells which extra byte would make it right, and for 255 of 256 damaged frames none does. So such a frame
+is taken as a frame where some extra byte fits and where the stream goes on with a magic byte; else it is damage.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from operator import itemgetter
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+from fastcrc.crc16 import mcrf4xx
+from pymavlink.dialects.v20 import all as dialect
+
+V2, V1 = 0xFD, 0xFE
+_SIGNED = 0x01
+LONGEST = 280 + 13
+
+_MESSAGES: dict[int, Any] = dialect.mavlink_map
+_EXTRA: dict[int, bytes] = {number: bytes([message.crc_extra]) for number, message in _MESSAGES.items()}
+_NUMBERS: dict[str, int] = {message.msgname: number for number, message in _MESSAGES.items()}
+
+
+def _crc_table() -> dict[int, int]:
+    """What one byte adds to a CRC: the reflected polynomial's 256 words, each with the byte that gives it."""
+    table = {}
+    for byte in range(256):
+        word = byte
+        for _ in range(8):
+            word = word >> 1 ^ (0x8408 if word & 1 else 0)
+        table[word] = byte
+    return table
+
+
+_BYTE_OF_WORD = _crc_table()
+
+
+class Frame(NamedTuple):
+    """One frame taken apart. `verdict`: "good", "unknown id", "definition differs"; only "good" may be decoded."""
+
+    version: int
+    system: int
+    component: int
+    sequence: int
+    message: int
+    payload: bytes
+    signed: bool
+    verdict: str
+
+
+def fits_some_extra(body: bytes, checksum: int) -> bool:
+    """Whether any CRC extra makes this checksum right: true for every intact frame, for 1 of 256 damaged ones."""
+    crc = mcrf4xx(body)
+    return (checksum ^ crc >> 8) in _BYTE_OF_WORD
+
+
+def parse(frame: bytes) -> Frame | None:
+    """One whole frame taken apart; None where it is no frame, cut, of unknown flags, or damaged. Never raises."""
+    size = len(frame)
+    if size < 8:
+        return None
+    length = frame[1]
+    if frame[0] == V2:
+        signed = frame[2] & _SIGNED
+        if frame[2] & ~_SIGNED or size != length + (25 if signed else 12):
+            return None
+        start, sequence, system, component = 10, frame[4], frame[5], frame[6]
+        message = frame[7] | frame[8] << 8 | frame[9] << 16
+    elif frame[0] == V1 and size == length + 8:
+        start, signed, sequence, system, component, message = 6, 0, frame[2], frame[3], frame[4], frame[5]
+    else:
+        return None
+    end = start + length
+    checksum = frame[end] | frame[end + 1] << 8
+    body = frame[1:end]
+    extra = _EXTRA.get(message)
+    if extra is not None and mcrf4xx(extra, mcrf4xx(body)) == checksum:
+        verdict = "good"
+    elif fits_some_extra(body, checksum):
+        verdict = "unknown id" if extra is None else "definition differs"
+    else:
+        return None
+    version = 2 if frame[0] == V2 else 1
+    return Frame(version, system, component, sequence, message, frame[start:end], bool(signed), verdict)
+
+
+@dataclass(slots=True)
+class FrameScanner:
+    """Finds the frames of one peer's bytes. One scanner a peer: nothing of one peer ever completes another's frame.
+
+    After damage it goes on one byte later, so that no intact frame is lost. What it holds back is less than one frame.
+    Counters: "crc error", "resynced bytes", "incompatible flags", "leftover bytes".
+    """
+
+    counters: Counter[str] = field(default_factory=Counter)
+    _held: bytes = b""
+    _in_step: bool = True  # the byte before was the end of a frame
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """The whole frames in a stream that goes on: what is incomplete waits for the next bytes."""
+        return self._scan(self._held + data if self._held else data, last=False)
+
+    def feed_datagram(self, data: bytes) -> list[bytes]:
+        """The whole frames of one datagram; what is left over at its end is dropped and counted."""
+        self._in_step = True
+        return self._scan(data, last=True)
+
+    def finish(self) -> list[bytes]:
+        """The stream has ended, or has paused for so long that what is held back cannot be a frame's beginning."""
+        return self._scan(self._held, last=True)
+
+    def _scan(self, data: bytes, *, last: bool) -> list[bytes]:
+        frames: list[bytes] = []
+        extras, crc, size, at = _EXTRA, mcrf4xx, len(data), 0
+        while at + 8 <= size:  # the shortest frame
+            if data[at] == V2 and at + 12 <= size and data[at + 2] <= _SIGNED:
+                end = at + data[at + 1] + 10
+                after = end + 15 if data[at + 2] else end + 2
+                extra = extras.get(data[at + 7] | data[at + 8] << 8 | data[at + 9] << 16)
+            elif data[at] == V1:
+                end = at + data[at + 1] + 6
+                after = end + 2
+                extra = extras.get(data[at + 5])
+            elif data[at] == V2 and at + 12 > size and not last:
+                break
+            else:
+                at = self._step(data, at)
+                continue
+            if after > size:
+                if not last:
+                    break
+                at = self._step(data, at)
+            elif extra is not None and crc(extra, crc(data[at + 1 : end])) == data[end] | data[end + 1] << 8:
+                frames.append(data[at:after])
+                self._in_step = True
+                at = after
+            elif not last and after == size and self._in_step:
+                break  # whether this is a frame shows in the byte after it
+            elif self._goes_on(data, at, end, after):
+                frames.append(data[at:after])
+                at = after
+            else:
+                self.counters["crc error"] += self._in_step
+                at = self._step(data, at)
+        return self._leave(data, at, last, frames)
+
+    def _goes_on(self, data: bytes, at: int, end: int, after: int) -> bool:
+        """Whether this is a frame that we cannot check: in step before and after, and some CRC extra fits."""
+        if not self._in_step or (after < len(data) and data[after] not in (V1, V2)):
+            return False
+        return fits_some_extra(data[at + 1 : end], data[end] | data[end + 1] << 8)
+
+    def _step(self, data: bytes, at: int) -> int:
+        """To the next byte that can begin a frame."""
+        if self._in_step and data[at] == V2 and len(data) > at + 2 and data[at + 2] > _SIGNED:
+            self.counters["incompatible flags"] += 1
+        self._in_step = False
+        ones = [place for place in (data.find(b"\xfd", at + 1), data.find(b"\xfe", at + 1)) if place > 0]
+        goal = min(ones, default=len(data))
+        self.counters["resynced bytes"] += goal - at
+        return goal
+
+    def _leave(self, data: bytes, at: int, last: bool, frames: list[bytes]) -> list[bytes]:
+        if last:
+            self._held = b""
+            self._in_step = True
+            self.counters["leftover bytes"] += len(data) - at
+        else:
+            self._held = data[at:]
+        return frames
+
+
+@dataclass(slots=True)
+class SequenceCheck:
+    """The sequence numbers of one (link, system, component): counts "lost", "duplicate", "reordered", "unsequenced"."""
+
+    last: int = -1
+    still: int = 0
+    recent: int = 0  # bit d: the number `last - d` was seen
+    moved: bool = False
+
+    def hear(self, sequence: int, counters: Counter[str]) -> None:
+        """Take the next frame's number into account."""
+        ahead = (sequence - self.last) & 255
+        if self.last < 0:
+            self.last, self.recent = sequence, 1
+        elif ahead == 1:
+            self.last, self.recent, self.moved = sequence, (self.recent << 1 | 1) & 0xFFFFFFFFFFFFFFFF, True
+        elif ahead == 0:
+            self._same(counters)
+        elif ahead >= 200 and (256 - ahead) < 64:
+            late = not self.recent >> (256 - ahead) & 1
+            counters["reordered" if late else "duplicate"] += 1
+            if late:
+                self.recent |= 1 << (256 - ahead)
+                counters["lost"] -= 1
+        else:
+            counters["lost"] += ahead - 1
+            self.last, self.recent, self.moved = sequence, (self.recent << ahead | 1) & 0xFFFFFFFFFFFFFFFF, True
+
+    def _same(self, counters: Counter[str]) -> None:
+        """Again the same number: a duplicate, unless this source never counts at all."""
+        self.still += 1
+        counters["duplicate" if self.moved else "unsequenced"] += 1
+
+
+def fields(name: str, *wanted: str) -> tuple[int, Callable[[bytes], tuple[Any, ...]]]:
+    """The id of a message and a function from its payload to the wanted fields (numbers, at least two), in that order."""
+    message = _MESSAGES[_NUMBERS[name]]
+    kinds = dict(zip(message.fieldnames, message.fieldtypes, strict=True))
+    place, places = 0, {}
+    for field_name, repeats in zip(message.ordered_fieldnames, message.array_lengths, strict=True):
+        places[field_name] = place
+        place += 1 if kinds[field_name] == "char" else max(repeats, 1)  # a text is one value, an array many
+    unpack, size = message.unpacker.unpack, message.unpacker.size
+    pick = itemgetter(*(places[one] for one in wanted))
+
+    def read(payload: bytes) -> tuple[Any, ...]:
+        if len(payload) != size:
+            payload = payload[:size].ljust(size, b"\0")
+        picked: tuple[Any, ...] = pick(unpack(payload))
+        return picked
+
+    return int(message.id), read
+
+
+def message_name(number: int) -> str:
+    """The name of a message id, or the number itself where we do not know it."""
+    return str(_MESSAGES[number].msgname) if number in _MESSAGES else str(number)
+
+
+def encode(name: str, values: dict[str, Any], *, system: int, component: int = 1, sequence: int = 0, version: int = 2) -> bytes:
+    """The bytes of one frame, packed by pymavlink itself. `values` are its fields in the wire's units.
+
+    Raises KeyError for an unknown message, TypeError for wrong field names, struct.error for values that do not fit.
+    """
+    link = SimpleNamespace(
+        seq=sequence & 255, srcSystem=system, srcComponent=component, signing=SimpleNamespace(sign_outgoing=False)
+    )
+    message = _MESSAGES[_NUMBERS[name]](**values)
+    packed: bytes = message.pack(link, force_mavlink1=version == 1)
+    return packed
+
+
+@dataclass(slots=True)
+class FrameEncoder:
+    """Frames of one component with its running sequence number."""
+
+    system: int
+    component: int = 1
+    sequence: int = 0
+
+    def encode(self, name: str, **values: Any) -> bytes:
+        """The next frame; see `encode`."""
+        frame = encode(name, values, system=self.system, component=self.component, sequence=self.sequence)
+        self.sequence = self.sequence + 1 & 255
+        return frame
+
+
