@@ -1,0 +1,71 @@
+"""The end of an archive: NAME.arrows becomes NAME.parquet, also when a session was killed in mid-batch."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from gateway.sinks.arrow import SCHEMAS
+
+ROW_GROUP = 65536  # rows gathered before Parquet is handed a row group: bounds memory, keeps compression good
+
+
+def finish(folder: Path) -> tuple[Path, ...]:
+    """Make the .parquet of every .arrows stream in a session's folder; returns the files made.
+
+    Keeps every whole batch of a stream that was cut. The .arrows is removed only when its .parquet is
+    complete on disk, so a death in here loses nothing and the next call starts over. Raises OSError when the
+    disk is full.
+    """
+    made = []
+    for name, schema in SCHEMAS.items():
+        stream = folder / f"{name}.arrows"
+        if stream.exists():
+            target = folder / f"{name}.parquet"
+            _convert(stream, target, schema)
+            stream.unlink()
+            made.append(target)
+    return tuple(made)
+
+
+def unfinished(folder: Path) -> bool:
+    """Whether a session's folder still holds streams that `finish` should make Parquet of."""
+    return any((folder / f"{name}.arrows").exists() for name in SCHEMAS)
+
+
+def whole_batches(stream: Path) -> Iterator[pa.RecordBatch]:
+    """The batches of an Arrow IPC stream up to its end, or up to where it was cut.
+
+    A stream that was cut inside its schema, or is empty, has none. Raises OSError when it cannot be opened.
+    """
+    with pa.memory_map(str(stream)) as source:
+        try:
+            reader = pa.ipc.open_stream(source)
+        except (pa.ArrowInvalid, OSError):  # nothing whole was written yet
+            return
+        while True:
+            try:
+                batch = reader.read_next_batch()
+            except (StopIteration, pa.ArrowInvalid, OSError):  # the end, or a batch that was cut
+                return
+            yield batch
+
+
+def _convert(stream: Path, target: Path, schema: pa.Schema) -> None:
+    part = target.with_name(target.name + ".part")
+    with pq.ParquetWriter(part, schema, compression="zstd") as writer:
+        waiting: list[pa.RecordBatch] = []
+        for batch in whole_batches(stream):
+            waiting.append(batch)
+            if sum(len(one) for one in waiting) >= ROW_GROUP:
+                writer.write_table(pa.Table.from_batches(waiting, schema))
+                waiting = []
+        if waiting:
+            writer.write_table(pa.Table.from_batches(waiting, schema))
+    with open(part, "rb") as written:
+        os.fsync(written.fileno())
+    os.replace(part, target)
