@@ -1,1 +1,1 @@
-"""A world that speaks the real wires: aircraft as MAVLink, radars as landing-radar datagrams; papers' studies."""
+"""A world that speaks the real wires: aircraft as MAVLink, radars as landing-radar datagrams; studies."""

@@ -40,6 +40,7 @@ class Innovation:
     covariance: Floats
     measured: Bools
     normalised: Floats  # (n,) squared, y' S^-1 y, chi-square with as many degrees as were measured
+    outlying: Bools  # (n,) so far out that the noise was raised
 
     @property
     def log_likelihood(self) -> Floats:
@@ -110,11 +111,12 @@ def update(
     s[:, axis, axis] += r
     inverse = np.linalg.inv(s)
     normalised = np.maximum((y[:, None, :] @ inverse @ y[:, :, None])[:, 0, 0], 0.0)
+    outlying = np.zeros(len(y), dtype=np.bool_)
     if robust is not None:
         limit = robust * robust * np.maximum(measured.sum(axis=1), 1)
-        far = normalised > limit
-        if far.any():
-            factor = np.where(far, normalised / limit, 1.0)[:, None]
+        outlying = normalised > limit
+        if outlying.any():
+            factor = np.where(outlying, normalised / limit, 1.0)[:, None]
             # S must grow by the factor, not R: a confident prediction would otherwise hold out for ever.
             r = np.where(measured, r + (factor - 1.0) * s[:, axis, axis], 1.0)
             s = predicted
@@ -127,7 +129,7 @@ def update(
     reduced[:, diagonal, diagonal] += 1.0
     covariance = reduced @ state.covariance @ reduced.transpose(0, 2, 1) + (gain * r[:, None, :]) @ gain.transpose(0, 2, 1)
     covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))
-    return Estimate(mean, covariance), Innovation(y, s, measured, normalised)
+    return Estimate(mean, covariance), Innovation(y, s, measured, normalised, outlying)
 
 
 def start(position: Floats, position_covariance: Floats, velocity: Floats, velocity_sigma: Floats, error_sigma_m: float) -> Estimate:

@@ -23,17 +23,25 @@ class _Peer:
 
     __slots__ = ("scanner", "source", "stream")
 
-    def __init__(self) -> None:
+    def __init__(self, counters: Counter[str]) -> None:
         self.source: Source | None = None
-        self.scanner = FrameScanner()
+        self.scanner = FrameScanner(counters)
         self.stream: int | None = None
+
+    def cut(self, chunk: Chunk) -> list[bytes]:
+        """The whole frames; what remains of a datagram, or of a connection that was lost, never reaches the next one."""
+        if chunk.stream is None:
+            return self.scanner.feed_datagram(chunk.data)
+        if chunk.stream != self.stream:
+            self.stream, self.scanner = chunk.stream, FrameScanner(self.scanner.counters)
+        return self.scanner.feed(chunk.data)
 
 
 class Intake:
     """Numbers the sources, cuts and stamps what they send. Link numbers: MAVLink links first, then radar links."""
 
     def __init__(self, stamper: Stamper, mavlink_origins: Sequence[str], radar_origins: Sequence[str]) -> None:
-        self.counters: Counter[str] = Counter()
+        self.counters: dict[str, Counter[str]] = {origin: Counter() for origin in mavlink_origins}
         self._stamper = stamper
         self._mavlink_origins = list(mavlink_origins)
         self._radars = {
@@ -54,7 +62,7 @@ class Intake:
         for heard_at, link, chunk in timed:
             radar = self._radars.get(link)
             if radar is not None:
-                arrivals.append(Arrival(self._stamper.stamp(heard_at), radar.number, chunk.data))
+                arrivals.append(Arrival(self._stamper.stamp(heard_at), radar.number, chunk.data, chunk.peer))
                 continue
             peer, frames = self._cut(link, chunk)
             if not frames:
@@ -69,28 +77,25 @@ class Intake:
         return sources, arrivals
 
     def _cut(self, link: int, chunk: Chunk) -> tuple[_Peer, list[bytes]]:
-        """The peer and the whole frames of a chunk; what remains of a datagram never reaches the next one."""
+        """The peer of a chunk, and the whole frames in it."""
         key = (link, chunk.peer)
         peer = self._peers.get(key)
         if peer is None:
-            peer = self._strangers.pop(key, None) or _Peer()
+            peer = self._strangers.pop(key, None) or _Peer(self.counters[self._mavlink_origins[link]])
             self._strangers[key] = peer  # newest last
             if len(self._strangers) > _STRANGERS_AT_MOST:
                 del self._strangers[next(iter(self._strangers))]
-        if chunk.stream is None or chunk.stream != peer.stream:
-            peer.stream = chunk.stream
-            peer.scanner.reset()
-        return peer, peer.scanner.feed(chunk.data)
+        return peer, peer.cut(chunk)
 
     def _admit(self, link: int, chunk: Chunk, peer: _Peer) -> Source | None:
         """The new source of a peer that sent its first whole frame, or None when there are too many."""
+        origin = self._mavlink_origins[link]
         if len(self._peers) >= PEERS_AT_MOST:
-            self.counters["frames of too many peers"] += 1
+            self.counters[origin]["datagrams of too many peers"] += 1
             return None
         key = (link, chunk.peer)
         self._strangers.pop(key, None)
         self._peers[key] = peer
-        origin = self._mavlink_origins[link]
         if chunk.peer != origin:
             origin = f"{origin} from {chunk.peer}"
         source = Source(self._next_number, "mavlink", f"mavlink-{len(self._peers)}", origin)

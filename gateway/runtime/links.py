@@ -163,6 +163,8 @@ class UdpLink:
                 kernel_utc_ns = seconds * 1_000_000_000 + nanoseconds
             elif kind == _SO_RXQ_OVFL and len(content) == 4:
                 (dropped,) = struct.unpack("@I", content)
+                if not self._dropped:
+                    self.news.append(("error", f"{self.url}: datagrams were lost before we could read them (counted)."))
                 self.counters["dropped by the kernel"] += (dropped - self._dropped) % (1 << 32)
                 self._dropped = dropped
         return data, kernel_utc_ns, _named(address) if address else str(self.url)

@@ -82,10 +82,11 @@ class Receiver:
 
     def counters(self) -> dict[str, int]:
         """Everything that was lost or odd before decoding, by link and reason."""
-        counted: Counter[str] = Counter(self._intake.counters)
-        for link in self._links:
-            for reason, number in link.counters.items():
-                counted[f"{link.url} {reason}"] += number
+        counted: Counter[str] = Counter()
+        by_link = [*self._intake.counters.items(), *((str(link.url), link.counters) for link in self._links)]
+        for origin, counters in by_link:
+            for reason, number in list(counters.items()):
+                counted[f"{origin} {reason}"] += number
         if self._overflow:
             counted["queue overflow"] = self._overflow
         return {reason: number for reason, number in sorted(counted.items()) if number}

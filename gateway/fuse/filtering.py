@@ -1,0 +1,168 @@
+"""The filter run over many tracks at once: each track's measurements in order, the k-th of every track in one batch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.align import SECOND, Fix, Plot
+from gateway.estimators.kalman import Estimate, predict
+from gateway.fuse.weighting import (
+    Model,
+    start_from_fixes,
+    start_from_plots,
+    update_literally,
+    update_with_fixes,
+    update_with_plots,
+)
+
+Floats = NDArray[np.float64]
+Measure = Fix | Plot
+Neighbour = Callable[[Fix], tuple[int, Floats, Floats] | None]  # radar, polar (3,), sigma (3,) at a fix's time
+
+NEVER = -(1 << 62)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Event:
+    """A track's state after one of its measurements, and when each kind of source last saw it."""
+
+    measure: Measure
+    mean: Floats  # (9,)
+    covariance: Floats  # (9, 9)
+    memory: Floats  # (w, 3) past innovations of the position source
+    gps_at: int
+    radar_at: int
+    interval: int  # ns, the longest of the last few between measurements
+    outlying: bool
+
+    @property
+    def at(self) -> int:
+        """When the state holds."""
+        return self.measure.at
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """Measurements of one track, in order, to be worked in after a state; without a state the first one starts it."""
+
+    track: int
+    base: Event | None
+    measures: Sequence[Measure]
+    neighbour: Neighbour
+
+
+def rank(measure: Measure) -> tuple[int, int, str, int]:
+    """The order in which measurements are worked in: by validity; at one instant by source, then by arrival."""
+    if isinstance(measure, Fix):
+        return measure.at, 0, measure.aircraft, measure.serial
+    return measure.at, 1, f"{measure.radar:05d}/{measure.number:05d}", measure.serial
+
+
+def run(jobs: Sequence[Job], model: Model) -> list[list[Event]]:
+    """The events of each job, one a measurement. Tracks do not touch each other: any batching gives the same bits."""
+    events: list[list[Event]] = [[] for _ in jobs]
+    for turn in range(max((len(job.measures) for job in jobs), default=0)):
+        active = [index for index, job in enumerate(jobs) if turn < len(job.measures)]
+        bases = [events[index][-1] if turn else jobs[index].base for index in active]
+        measures = [jobs[index].measures[turn] for index in active]
+        neighbours = [jobs[index].neighbour for index in active]
+        for index, event in zip(active, _advance(bases, measures, neighbours, model), strict=True):
+            events[index].append(event)
+    return events
+
+
+def _advance(
+    bases: Sequence[Event | None], measures: Sequence[Measure], neighbours: Sequence[Neighbour], model: Model
+) -> list[Event]:
+    """One measurement for each of some tracks."""
+    results: list[Event | None] = [None] * len(measures)
+    going = [row for row, base in enumerate(bases) if base is not None]
+    mean, covariance, memory = _stacked([base for base in bases if base is not None], model)
+    elapsed_s = np.array([(measures[row].at - bases[row].at) / SECOND for row in going])  # type: ignore[union-attr]
+    if going:
+        state = predict(Estimate(mean, covariance), elapsed_s, model.motion)
+        groups: dict[tuple[str, int], list[int]] = {}
+        paired = {row: neighbours[row](measure) for row in going if _literal(measure := measures[row], model)}
+        for place, row in enumerate(going):
+            groups.setdefault(_group(measures[row], paired.get(row)), []).append(place)
+        for (kind, radar), places in groups.items():
+            part = Estimate(state.mean[places], state.covariance[places])
+            chosen = [measures[going[place]] for place in places]
+            near = [paired.get(going[place]) for place in places]
+            after, outlying, kept = _update(kind, radar, part, chosen, near, memory[places], model)
+            for i, place in enumerate(places):
+                row = going[place]
+                results[row] = _event(measures[row], after, i, kept[i], bases[row], bool(outlying[i]))
+    for row, base in enumerate(bases):
+        if base is None:
+            first = _start(measures[row], model)
+            results[row] = _event(measures[row], first, 0, np.full((model.memory, 3), math.nan), None, False)
+    return [event for event in results if event is not None]
+
+
+def _stacked(bases: Sequence[Event], model: Model) -> tuple[Floats, Floats, Floats]:
+    mean = np.array([base.mean for base in bases]).reshape(-1, 9)
+    covariance = np.array([base.covariance for base in bases]).reshape(-1, 9, 9)
+    memory = np.array([base.memory for base in bases]).reshape(-1, model.memory, 3)
+    return mean, covariance, memory
+
+
+def _literal(measure: Measure, model: Model) -> bool:
+    return model.weighting == "literal" and isinstance(measure, Fix)
+
+
+def _group(measure: Measure, near: tuple[int, Floats, Floats] | None) -> tuple[str, int]:
+    """Which measurements can be worked in together: those with one formula and one radar."""
+    if isinstance(measure, Plot):
+        return "plot", measure.radar
+    return ("literal", near[0]) if near is not None else ("fix", 0)
+
+
+def _update(
+    kind: str,
+    radar: int,
+    state: Estimate,
+    measures: Sequence[Measure],
+    near: Sequence[tuple[int, Floats, Floats] | None],
+    memory: Floats,
+    model: Model,
+) -> tuple[Estimate, NDArray[np.bool_], Floats]:
+    """One group's update: the states after it, which measurements lay outside, the memories."""
+    if kind == "plot":
+        plots = [measure for measure in measures if isinstance(measure, Plot)]
+        polar, sigma = np.array([plot.polar for plot in plots]), np.array([plot.sigma for plot in plots])
+        after, told = update_with_plots(state, polar, sigma, model.radars[radar])
+        return after, told.outlying, memory
+    fixes = [measure for measure in measures if isinstance(measure, Fix)]
+    position, sigma = np.array([fix.enu_m for fix in fixes]), np.array([fix.sigma_m for fix in fixes])
+    if kind == "literal":
+        seen = [one for one in near if one is not None]
+        polar, spread = np.array([one[1] for one in seen]), np.array([one[2] for one in seen])
+        after, told = update_literally(state, position, sigma, polar, spread, model.radars[radar])
+        return after, told.outlying, memory
+    velocity = np.array([fix.velocity_mps for fix in fixes])
+    speed_sigma = np.array([fix.velocity_sigma_mps for fix in fixes])
+    after, told, memory = update_with_fixes(state, position, sigma, velocity, speed_sigma, memory, model)
+    return after, told.outlying, memory
+
+
+def _start(measure: Measure, model: Model) -> Estimate:
+    if isinstance(measure, Plot):
+        return start_from_plots(measure.polar[None], measure.sigma[None], measure.radar, model)
+    velocity = measure.velocity_mps[None]
+    sigma = np.array([measure.velocity_sigma_mps])
+    return start_from_fixes(measure.enu_m[None], measure.sigma_m[None], velocity, sigma, model)
+
+
+def _event(measure: Measure, after: Estimate, row: int, memory: Floats, base: Event | None, outlying: bool) -> Event:
+    is_fix = isinstance(measure, Fix)
+    gps_at = measure.at if is_fix else (base.gps_at if base else NEVER)
+    radar_at = (base.radar_at if base else NEVER) if is_fix else measure.at
+    # The longest recent interval, forgotten slowly: tells a source of one report each 5 s from one that fell silent.
+    interval = max(measure.at - base.at, base.interval - base.interval // 8) if base else 0
+    return Event(measure, after.mean[row], after.covariance[row], memory, gps_at, radar_at, interval, outlying)
