@@ -67,9 +67,7 @@ def fly(path: Path, runway: Runway, time_s: ArrayLike) -> Flown:
     meridian, vertical = meridian_radius_m(latitude), prime_vertical_radius_m(latitude)
     radius = np.sqrt(meridian * vertical)
     outwards_mps = vx * np.cos(bearing_left) + vy * np.sin(bearing_left)
-    narrowing = np.sinc(
-        ground_m / radius / math.pi
-    )  # geodesics from one point spread less than rays of a plane
+    narrowing = np.sinc(ground_m / radius / math.pi)  # geodesics from one point spread less than rays of a plane
     leftwards_mps = (vy * np.cos(bearing_left) - vx * np.sin(bearing_left)) * narrowing
     north = outwards_mps * np.cos(outward) + leftwards_mps * np.sin(outward)
     east = outwards_mps * np.sin(outward) - leftwards_mps * np.cos(outward)

@@ -129,9 +129,7 @@ def gps_times(parameters: GpsParameters, start_s: float, end_s: float, phases: A
     return np.asarray(np.round(first[..., None] + period * np.arange(count), 3), dtype=np.float64)
 
 
-def gps_phases(
-    parameters: GpsParameters, generator: np.random.Generator, shape: tuple[int, ...] = ()
-) -> Floats:
+def gps_phases(parameters: GpsParameters, generator: np.random.Generator, shape: tuple[int, ...] = ()) -> Floats:
     """The phases (shape) of sources, s: as set, or uniform over a period."""
     drawn = generator.uniform(0.0, 1.0, shape) * parameters.period_s
     return np.asarray(drawn) if parameters.random_phase else np.full(shape, parameters.phase_s)

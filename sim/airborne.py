@@ -1,0 +1,234 @@
+"""What a simulated aircraft says on its MAVLink link, frame by frame, in order of arrival.
+
+HEARTBEAT, SYSTEM_TIME, ATTITUDE and SIM_STATE (the truth) are said at their periods; GPS_RAW_INT and
+GLOBAL_POSITION_INT carry the time at which the position was so, and arrive as late as the position source is.
+A source that gives positions only sends no GLOBAL_POSITION_INT: that message has no way to leave the velocity
+out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adapters.mavlink_frames import FrameEncoder
+from sim.earth import Flown
+from sim.scene import Aircraft, Scene
+from sim.sensors import GpsMeasured, gps_phases, gps_times, measure_gps, stream
+
+Floats = NDArray[np.float64]
+
+_FIXED_WING, _ARDUPILOT = 1, 3
+_ARMED_AUTO, _DISARMED, _ACTIVE, _STANDBY, _AUTO_MODE = 0x9D, 0x1D, 4, 3, 10
+_UNKNOWN_16 = 65535
+
+Fields = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class _Sayings:
+    """Messages of one name: when each arrives (n,), and a function from its index to its fields."""
+
+    name: str
+    arrives_s: Floats
+    fields: Callable[[int], Fields]
+
+
+def frames(scene: Scene, aircraft: Aircraft) -> Iterator[tuple[float, bytes]]:
+    """Arrival times (s of the scene, never falling) and frames of one aircraft."""
+    start, end = scene.present(aircraft)
+    if end <= start:
+        return
+    sayings = [
+        _heartbeats(scene, aircraft),
+        _clocks(scene, aircraft),
+        _attitudes(scene, aircraft),
+        *_truths(scene, aircraft),
+        *_positions(scene, aircraft),
+    ]
+    arrives = np.concatenate([one.arrives_s for one in sayings])
+    which = np.repeat(np.arange(len(sayings)), [len(one.arrives_s) for one in sayings])
+    index = np.concatenate([np.arange(len(one.arrives_s)) for one in sayings])
+    encoder = FrameEncoder(aircraft.system)
+    # a stable sort: said at one instant means said in the order of the list, truth right after attitude
+    for place in np.argsort(arrives, kind="stable"):
+        if arrives[place] < scene.duration_s:
+            saying = sayings[which[place]]
+            yield float(arrives[place]), encoder.encode(saying.name, **saying.fields(int(index[place])))
+
+
+def _ticks(scene: Scene, aircraft: Aircraft, period_s: float) -> Floats:
+    """Times of a message with a period, in whole ms; aircraft do not all speak at the same instant."""
+    start, end = scene.present(aircraft)
+    first = start + 0.037 * (aircraft.system - 1) % min(period_s, 1.0)
+    return np.asarray(np.round(np.arange(first, end, period_s), 3), dtype=np.float64)
+
+
+def _boot_ms(scene: Scene, aircraft: Aircraft, time_s: float) -> int:
+    """A time of the scene by the aircraft's own clock, which runs in whole milliseconds since it was switched on."""
+    start, _ = scene.present(aircraft)
+    return round((time_s - start + scene.say.booted_before_s) * 1000.0)
+
+
+def _heartbeats(scene: Scene, aircraft: Aircraft) -> _Sayings:
+    ticks = _ticks(scene, aircraft, scene.say.heartbeat_period_s)
+    moves = np.hypot(*scene.flown(aircraft, ticks).velocity_mps[:, :2].T) > 0.0
+
+    def fields(index: int) -> Fields:
+        return {
+            "type": _FIXED_WING,
+            "autopilot": _ARDUPILOT,
+            "base_mode": _ARMED_AUTO if moves[index] else _DISARMED,
+            "custom_mode": _AUTO_MODE,
+            "system_status": _ACTIVE if moves[index] else _STANDBY,
+            "mavlink_version": 3,
+        }
+
+    return _Sayings("HEARTBEAT", ticks + scene.say.latency_s, fields)
+
+
+def _clocks(scene: Scene, aircraft: Aircraft) -> _Sayings:
+    ticks = _ticks(scene, aircraft, scene.say.clock_period_s)
+
+    def fields(index: int) -> Fields:
+        time_s = float(ticks[index])
+        return {
+            "time_unix_usec": scene.at_ns(time_s) // 1000,
+            "time_boot_ms": _boot_ms(scene, aircraft, time_s),
+        }
+
+    return _Sayings("SYSTEM_TIME", ticks + scene.say.latency_s, fields)
+
+
+def _attitudes(scene: Scene, aircraft: Aircraft) -> _Sayings:
+    ticks = _ticks(scene, aircraft, scene.say.attitude_period_s)
+    flown = scene.flown(aircraft, ticks)
+    yaw = np.remainder(flown.yaw_rad + math.pi, 2.0 * math.pi) - math.pi
+
+    def fields(index: int) -> Fields:
+        return {
+            "time_boot_ms": _boot_ms(scene, aircraft, float(ticks[index])),
+            "roll": float(flown.roll_rad[index]),
+            "pitch": float(flown.pitch_rad[index]),
+            "yaw": float(yaw[index]),
+            "rollspeed": 0.0,
+            "pitchspeed": 0.0,
+            "yawspeed": float(flown.turn_radps[index]),
+        }
+
+    return _Sayings("ATTITUDE", ticks + scene.say.latency_s, fields)
+
+
+def _truths(scene: Scene, aircraft: Aircraft) -> list[_Sayings]:
+    """SIM_STATE has no time of its own: it is said at once, at the times of attitudes where the periods allow."""
+    if scene.say.truth_period_s <= 0.0:
+        return []
+    ticks = _ticks(scene, aircraft, scene.say.truth_period_s)
+    flown = scene.flown(aircraft, ticks)
+    return [_Sayings("SIM_STATE", ticks + scene.say.latency_s, lambda index: _sim_state(scene, flown, index))]
+
+
+def _sim_state(scene: Scene, flown: Flown, index: int) -> Fields:
+    roll, pitch, yaw = (float(angle[index]) for angle in (flown.roll_rad, flown.pitch_rad, flown.yaw_rad))
+    latitude_deg, longitude_deg = math.degrees(flown.latitude_rad[index]), math.degrees(flown.longitude_rad[index])
+    east, north, up = (float(part) for part in flown.velocity_mps[index])
+    return {
+        **dict(zip(("q1", "q2", "q3", "q4"), _quaternion(roll, pitch, yaw), strict=True)),
+        **{"roll": roll, "pitch": pitch, "yaw": yaw},
+        **dict.fromkeys(("xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro"), 0.0),
+        "lat": latitude_deg,
+        "lon": longitude_deg,
+        "alt": float(flown.height_m[index]) - scene.geoid_separation_m,
+        "std_dev_horz": 0.0,
+        "std_dev_vert": 0.0,
+        "vn": north,
+        "ve": east,
+        "vd": -up,
+        "lat_int": round(latitude_deg * 1e7),
+        "lon_int": round(longitude_deg * 1e7),
+    }
+
+
+def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
+    """The attitude as a unit quaternion w, x, y, z, from north-east-down to the body."""
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(0.5 * a), math.sin(0.5 * a)) for a in (roll, pitch, yaw))
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+def reports(scene: Scene, aircraft: Aircraft) -> GpsMeasured:
+    """Every report of an aircraft's position source, also those that will not be heard."""
+    start, end = scene.present(aircraft)
+    generator = stream(scene.seed, "gps", aircraft.system)
+    valid = gps_times(scene.gps, start, end, gps_phases(scene.gps, generator))
+    return measure_gps(scene.gps, valid, scene.flown(aircraft, valid), generator)
+
+
+def _positions(scene: Scene, aircraft: Aircraft) -> list[_Sayings]:
+    measured = reports(scene, aircraft)
+    heard = np.flatnonzero(measured.heard)
+    arrives = measured.received_s[heard]
+    yaw = scene.flown(aircraft, measured.valid_s).yaw_rad
+    raw = _Sayings("GPS_RAW_INT", arrives, lambda index: _gps_raw(scene, measured, int(heard[index])))
+    if not scene.gps.velocity:
+        return [raw]
+
+    def fields(index: int) -> Fields:
+        which = int(heard[index])
+        boot_ms = _boot_ms(scene, aircraft, float(measured.valid_s[which]))
+        return _global_position(scene, measured, which, boot_ms, float(yaw[which]))
+
+    return [raw, _Sayings("GLOBAL_POSITION_INT", arrives, fields)]
+
+
+def _place(scene: Scene, measured: GpsMeasured, index: int) -> Fields:
+    return {
+        "lat": round(math.degrees(measured.latitude_rad[index]) * 1e7),
+        "lon": round(math.degrees(measured.longitude_rad[index]) * 1e7),
+        "alt": round((float(measured.height_m[index]) - scene.geoid_separation_m) * 1e3),
+    }
+
+
+def _gps_raw(scene: Scene, measured: GpsMeasured, index: int) -> Fields:
+    gps, (east, north, _) = scene.gps, measured.velocity_mps[index]
+    ground_cmps = round(math.hypot(east, north) * 1e2) if gps.velocity else _UNKNOWN_16
+    course_cdeg = round(math.degrees(math.atan2(east, north)) % 360.0 * 1e2) % 36000 if gps.velocity else _UNKNOWN_16
+    sigma_mm = round(gps.sigma_m * 1e3) if gps.accuracy_given else 0
+    return {
+        "time_usec": scene.at_ns(float(measured.valid_s[index])) // 1000,
+        "fix_type": 3,
+        **_place(scene, measured, index),
+        "eph": 80,
+        "epv": 120,
+        "vel": ground_cmps,
+        "cog": course_cdeg,
+        "satellites_visible": 12,
+        "alt_ellipsoid": round(float(measured.height_m[index]) * 1e3),
+        "h_acc": sigma_mm,
+        "v_acc": sigma_mm,
+        "vel_acc": round(gps.velocity_sigma_mps * 1e3) if gps.accuracy_given and gps.velocity else 0,
+    }
+
+
+def _global_position(scene: Scene, measured: GpsMeasured, index: int, boot_ms: int, yaw_rad: float) -> Fields:
+    east, north, up = measured.velocity_mps[index]
+    place = _place(scene, measured, index)
+    ground_mm = round((scene.site.runway.height_m - scene.geoid_separation_m) * 1e3)
+    return {
+        "time_boot_ms": boot_ms,
+        **place,
+        "relative_alt": place["alt"] - ground_mm,
+        "vx": round(north * 1e2),
+        "vy": round(east * 1e2),
+        "vz": round(-up * 1e2),
+        "hdg": round(math.degrees(yaw_rad) % 360.0 * 1e2) % 36000,
+    }

@@ -1,0 +1,134 @@
+"""What a simulated landing radar says: a datagram of plots a scan (more where there are many), and its status."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adapters.landing_radar import MAXIMUM_PLOTS, Header, Plot, Status, encode
+from gateway.frames import RadarFrame, RunwayFrame, turn
+from gateway.settings import RadarSite, Site
+from sim.earth import Flown
+from sim.scene import Scene, SceneRadar
+from sim.sensors import PlotsMeasured, RadarParameters, draw_clutter, during, measure_radar, scan_times, stream
+
+Floats = NDArray[np.float64]
+
+
+class RadarSight:
+    """A radar's view of the world: the truth about an aircraft in the radar's frame."""
+
+    def __init__(self, site: Site, radar: RadarSite) -> None:
+        self._runway = RunwayFrame(site.runway)
+        self._radar = RadarFrame.of(radar, self._runway)
+
+    def see(self, flown: Flown) -> tuple[Floats, Floats]:
+        """Positions m and velocities m/s (..., 3) in the radar's frame."""
+        enu = self._runway.enu_from_geodetic(flown.latitude_rad, flown.longitude_rad, flown.height_m)
+        local_from_enu = self._runway.local_from_enu(flown.latitude_rad, flown.longitude_rad)
+        velocity = np.sum(local_from_enu * flown.velocity_mps[..., :, None], axis=-2)  # by the transpose
+        return self._radar.from_enu(enu), turn(self._radar.radar_from_enu, velocity)
+
+    def status(self, radar: RadarSite, period_s: float) -> Status:
+        """What the radar says of itself."""
+        latitude, longitude, height = self._runway.geodetic_from_enu(self._radar.antenna_enu_m)
+        return Status(
+            "operating",
+            "precision approach",
+            period_s,
+            math.degrees(float(latitude)),
+            math.degrees(float(longitude)),
+            float(height),
+            math.degrees(radar.compass_boresight_rad) % 360.0,
+        )
+
+
+class RadarVoice:
+    """Datagrams of one radar, with its running sequence number."""
+
+    def __init__(self, number: int, key: bytes | None = None) -> None:
+        self._number, self._key, self._sequence = number, key, 0
+
+    def plots(self, time_ns: int, plots: Sequence[Plot]) -> list[bytes]:
+        """One scan: at least one datagram, so that an empty sky is told from a silent radar."""
+        parts = [plots[at : at + MAXIMUM_PLOTS] for at in range(0, max(len(plots), 1), MAXIMUM_PLOTS)]
+        return [encode(self._header("plots", time_ns), part, key=self._key) for part in parts]
+
+    def status(self, time_ns: int, status: Status) -> bytes:
+        """One status datagram."""
+        return encode(self._header("status", time_ns), [status], key=self._key)
+
+    def _header(self, kind: str, time_ns: int) -> Header:
+        sequence, self._sequence = self._sequence, (self._sequence + 1) & 0xFFFFFFFF
+        return Header("plots" if kind == "plots" else "status", self._number, sequence, time_ns, simulated=True)
+
+
+def plot_record(number: int, time_ns: int, polar: Floats, radial_mps: float, parameters: RadarParameters) -> Plot:
+    """A plot as the wire has it, of range m, azimuth rad, elevation rad (3,) and radial velocity; NaN: not measured."""
+    distance, azimuth, elevation = (None if math.isnan(part) else float(part) for part in polar)
+    given = parameters.sigma_given
+    return Plot(
+        number,
+        time_ns,
+        distance,
+        None if azimuth is None else math.degrees(azimuth),
+        None if elevation is None else math.degrees(elevation),
+        None if math.isnan(radial_mps) else radial_mps,
+        range_sigma_m=parameters.range_sigma_m if given else None,
+        azimuth_sigma_rad=parameters.azimuth_sigma_rad if given else None,
+        elevation_sigma_rad=parameters.elevation_sigma_rad if given else None,
+    )
+
+
+def sightings(scene: Scene, radar: SceneRadar) -> list[tuple[int, NDArray[np.int64], PlotsMeasured]]:
+    """For each aircraft in the scene: its track number, the scans (n,) it is there in, and what was measured."""
+    sight = RadarSight(scene.site, radar.site)
+    scans = scan_times(radar.parameters, 0.0, scene.duration_s)
+    found = []
+    for index, aircraft in enumerate(scene.aircraft):
+        start, end = scene.present(aircraft)
+        there = np.flatnonzero((scans >= start) & (scans < end))
+        position, velocity = sight.see(scene.flown(aircraft, scans[there]))
+        generator = stream(scene.seed, radar.name, aircraft.system)
+        measured = measure_radar(radar.parameters, scans[there], position, velocity, generator)
+        number = radar.parameters.first_number + index if radar.parameters.numbered else 0
+        found.append((number, there, measured))
+    return found
+
+
+def datagrams(scene: Scene, radar: SceneRadar) -> Iterator[tuple[float, bytes]]:
+    """Arrival times (s of the scene, never falling) and datagrams of one radar."""
+    parameters, voice = radar.parameters, RadarVoice(radar.site.number, radar.key)
+    scans = scan_times(parameters, 0.0, scene.duration_s)
+    plots = _plots_of_scans(scene, radar, scans)
+    status = RadarSight(scene.site, radar.site).status(radar.site, parameters.period_s)
+    silent = during(parameters.dropouts, scans)
+    next_status_s = 0.0
+    for scan, time_s in enumerate(scans.tolist()):
+        arrives = time_s + parameters.latency_s
+        if silent[scan] or arrives >= scene.duration_s:
+            continue
+        stamp_ns = scene.at_ns(time_s + parameters.time_error_s)
+        if time_s >= next_status_s:
+            next_status_s += parameters.status_period_s
+            yield arrives, voice.status(stamp_ns, status)
+        records = [plot_record(number, stamp_ns, *measured, parameters) for number, *measured in plots[scan]]
+        for datagram in voice.plots(stamp_ns, records):
+            yield arrives, datagram
+
+
+def _plots_of_scans(scene: Scene, radar: SceneRadar, scans: Floats) -> list[list[tuple[int, Floats, float]]]:
+    """Track number, polar (3,), radial velocity of the plots of each scan, in order of azimuth as an antenna turns."""
+    plots: list[list[tuple[int, Floats, float]]] = [[] for _ in scans]
+    for number, there, measured in sightings(scene, radar):
+        for place in np.flatnonzero(measured.seen):
+            plots[there[place]].append((number, measured.polar[place], float(measured.radial_mps[place])))
+    which, polar = draw_clutter(radar.parameters, len(scans), stream(scene.seed, radar.name, "clutter"))
+    for scan, false_plot in zip(which.tolist(), polar, strict=True):
+        plots[scan].append((0, false_plot, math.nan))
+    for one in plots:
+        one.sort(key=lambda plot: (math.isnan(plot[1][1]), plot[1][1], plot[0]))
+    return plots
