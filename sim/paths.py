@@ -155,6 +155,28 @@ class CasePath:
 
 
 @dataclass(frozen=True, slots=True)
+class Delayed:
+    """Another path flown later."""
+
+    path: Path
+    by_s: float
+
+    @property
+    def start_s(self) -> float:
+        """The other path's, later."""
+        return self.path.start_s + self.by_s
+
+    @property
+    def end_s(self) -> float:
+        """The other path's, later."""
+        return self.path.end_s + self.by_s
+
+    def motion(self, time_s: ArrayLike) -> Motion:
+        """The other path's motion, that much earlier."""
+        return self.path.motion(np.asarray(time_s, dtype=np.float64) - self.by_s)
+
+
+@dataclass(frozen=True, slots=True)
 class Abeam:
     """Another path turned about a point of the ground plan: the same distance and height, another bearing.
 

@@ -39,9 +39,9 @@ class RadarSight:
             "operating",
             "precision approach",
             period_s,
-            math.degrees(float(latitude)),
-            math.degrees(float(longitude)),
-            float(height),
+            math.degrees(latitude.item()),
+            math.degrees(longitude.item()),
+            height.item(),
             math.degrees(radar.compass_boresight_rad) % 360.0,
         )
 
@@ -113,9 +113,9 @@ def datagrams(scene: Scene, radar: SceneRadar) -> Iterator[tuple[float, bytes]]:
             continue
         stamp_ns = scene.at_ns(time_s + parameters.time_error_s)
         if time_s >= next_status_s:
-            next_status_s += parameters.status_period_s
+            next_status_s = time_s + parameters.status_period_s
             yield arrives, voice.status(stamp_ns, status)
-        records = [plot_record(number, stamp_ns, *measured, parameters) for number, *measured in plots[scan]]
+        records = [plot_record(number, stamp_ns, polar, radial, parameters) for number, polar, radial in plots[scan]]
         for datagram in voice.plots(stamp_ns, records):
             yield arrives, datagram
 

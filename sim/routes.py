@@ -50,7 +50,7 @@ class RoutePath:
 
     def __init__(self, points: Sequence[RoutePoint], start_s: float = 0.0) -> None:
         """Raises ValueError where corners are too near to each other for turns at their speeds."""
-        time, track = _fly_track(points)
+        time, track, self.passes_s = _fly_track(points)
         stops = points[-1].speed_mps == 0.0
         rest = (1, np.zeros(3)) if stops else "not-a-knot"
         self._position = CubicSpline(time, track, bc_type=("not-a-knot", rest))
@@ -61,6 +61,9 @@ class RoutePath:
     def start_s(self) -> float:
         """When it sets out."""
         return self._start_s
+
+    passes_s: Floats
+    """When each point of the route is passed (of a corner: the middle of its turn), s after setting out."""
 
     @property
     def flown_s(self) -> float:
@@ -164,8 +167,8 @@ def _curve_through(points: Sequence[RoutePoint]) -> tuple[_Curve, list[float]]:
     return _Curve.of(lengths, [*curvatures, 0.0], float(heading[0])), [*stations, sum(lengths)]
 
 
-def _fly_track(points: Sequence[RoutePoint]) -> tuple[Floats, Floats]:
-    """Times (n,) from 0 and positions (n, 3): x, y, height, of a route."""
+def _fly_track(points: Sequence[RoutePoint]) -> tuple[Floats, Floats, Floats]:
+    """Times (n,) from 0 and positions (n, 3): x, y, height, of a route; and when each of its points is passed."""
     curve, stations = _curve_through(points)
     station, track = curve.track(np.array([points[0].x_m, points[0].y_m]))
     square = np.interp(station, stations, [point.speed_mps**2 for point in points])
@@ -173,6 +176,7 @@ def _fly_track(points: Sequence[RoutePoint]) -> tuple[Floats, Floats]:
     passed = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(station) / (speed[:-1] + speed[1:]))])
     level = np.interp(station, stations, [point.height_m for point in points])
     height = uniform_filter1d(level, size=int(ROUND_OUT_M / _STEP_M) | 1, mode="nearest")
+    passes_s = np.interp(stations, station, passed)
     time = np.linspace(0.0, passed[-1], max(math.ceil(passed[-1] / _KNOT_S), 4) + 1)
     cell = np.clip(np.searchsorted(passed, time, side="right") - 1, 0, len(station) - 2)
     since = time - passed[cell]
@@ -180,4 +184,4 @@ def _fly_track(points: Sequence[RoutePoint]) -> tuple[Floats, Floats]:
     along = since * (speed[cell] + 0.5 * gain * since)
     middle = curve.heading_at(station[cell] + 0.5 * along)
     x, y = track[cell, 0] + along * np.cos(middle), track[cell, 1] + along * np.sin(middle)
-    return time, np.stack([x, y, np.interp(station[cell] + along, station, height)], axis=-1)
+    return time, np.stack([x, y, np.interp(station[cell] + along, station, height)], axis=-1), passes_s
