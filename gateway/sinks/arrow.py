@@ -65,9 +65,7 @@ PREDICTIONS = pa.schema(
     ]
 )
 
-TRUTH = pa.schema(
-    [pa.field("time", _TIME, nullable=False), ("aircraft", _TEXT), *_PLACE, *_VELOCITY, ("mode", _TEXT)]
-)
+TRUTH = pa.schema([pa.field("time", _TIME, nullable=False), ("aircraft", _TEXT), *_PLACE, *_VELOCITY, ("mode", _TEXT)])
 
 SCHEMAS = {"tracks": TRACKS, "predictions": PREDICTIONS, "truth": TRUTH}
 """The tables of a session by the stem of their files."""
@@ -225,9 +223,7 @@ class ArrowSink:
         self._flushed_at: int | None = None
         self._tracks: _Table[Fused] = _Table(folder, "tracks", tracks_batch)
         self._predictions: _Table[Predicted] = _Table(folder, "predictions", predictions_batch)
-        self._truth: _Table[Truth] = _Table(
-            folder, "truth", lambda rows: truth_batch(rows, geoid_separation_m)
-        )
+        self._truth: _Table[Truth] = _Table(folder, "truth", lambda rows: truth_batch(rows, geoid_separation_m))
 
     def write(self, picture: Picture) -> None:
         """Take the rows of one step; raises OSError when a full disk refuses them."""

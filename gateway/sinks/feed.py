@@ -1,0 +1,149 @@
+"""Two ways out for what is drawn: a file that never drops, and a server that never makes anybody wait.
+
+The two are recording streams of their own, with the same identity. In one stream with two sinks, a viewer
+that stands still stops the file beside it; apart, neither knows of the other.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import queue
+import shutil
+import socket
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from gateway.sinks.scene.entry import Always, Entry, send
+
+BATCHES_WAITING = 64  # for a viewer that stands still: about 25 s of them, then they are dropped
+STOP_S = 5.0  # a viewer that stands still does not hold up the end of the session for longer
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What a recording is called; two streams of one identity are one recording to a viewer."""
+
+    application: str
+    recording: str
+    name: str
+
+    def stream(self) -> rr.RecordingStream:
+        """A new stream of this recording, not yet connected to anything."""
+        # Rows come in columns that are sent as they are; the tick only moves what is logged row by row.
+        batching = rr.ChunkBatcherConfig(flush_tick=0.2)
+        return rr.RecordingStream(self.application, recording_id=self.recording, batcher_config=batching)
+
+
+class FileFeed:
+    """An .rrd file, written in the caller's thread: what `send` returned from is in the file.
+
+    After kill -9 the file opens up to the last `send`; only the index at its end is missing. Raises OSError
+    when the file cannot be opened or does not take the data. Rerun itself only writes a line to stderr then
+    and goes on without the file, and says so nowhere but in `flush`: so every `send` ends with one.
+    """
+
+    def __init__(self, path: Path, identity: Identity, blueprint: rrb.Blueprint) -> None:
+        self._path = path
+        path.open("wb").close()  # raises here, in plain words, if it cannot be written
+        self._stream = identity.stream()
+        self._stream.set_sinks(rr.FileSink(path), default_blueprint=blueprint)
+        self._stream.send_recording_name(identity.name)
+        self._failed = self._closed = False
+
+    def send(self, entries: Sequence[Entry]) -> None:
+        """Write entries; raises OSError when they did not reach the file."""
+        send(self._stream, entries)
+        self._flush()
+
+    def _flush(self) -> None:
+        try:
+            self._stream.flush()
+        except RuntimeError as error:
+            self._failed = True
+            full = shutil.disk_usage(self._path.parent).free < 1 << 20
+            code = errno.ENOSPC if full else errno.EIO
+            reason = f"the recording could not be written: {os.strerror(code)}"
+            raise OSError(code, reason, str(self._path)) from error
+
+    def close(self) -> None:
+        """Write the index and let go of the file; raises OSError if the last data did not reach it."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            if not self._failed:  # what failed once was said once
+                self._flush()
+        finally:
+            self._stream.disconnect()
+
+
+class ServedFeed:
+    """A Rerun server that any number of viewers may connect to at any time, fed from a thread of its own.
+
+    `host` is what it listens on, `port` 0 takes a free one; `address` is what a viewer opens. A late viewer
+    gets what the `memory_limit` still holds, and the blueprint. `send` never blocks: when a viewer stands
+    still and the queue is full, rows are dropped and counted in `dropped`, what holds at all times is kept.
+    Raises OSError if the port is taken.
+    """
+
+    def __init__(self, host: str, port: int, identity: Identity, blueprint: rrb.Blueprint, memory_limit: str) -> None:
+        port = _free_port(host, port)
+        shown = "127.0.0.1" if host in ("0.0.0.0", "::") else host
+        self.address = f"rerun+http://{shown}:{port}/proxy"
+        self.dropped = 0
+        self._stream = identity.stream()
+        server = rr.GrpcServerSink(host, port, server_memory_limit=memory_limit)
+        self._stream.set_sinks(server, default_blueprint=blueprint)
+        self._stream.send_recording_name(identity.name)
+        try:
+            self._stream.flush(timeout_sec=5.0)
+        except RuntimeError as error:
+            raise OSError(errno.EADDRINUSE, f"the viewer's server could not start on {host}:{port}") from error
+        self._waiting: queue.Queue[Sequence[Entry] | None] = queue.Queue(BATCHES_WAITING)
+        self._kept: list[Entry] = []
+        self._thread = threading.Thread(target=self._run, name="viewer feed", daemon=True)
+        self._thread.start()
+
+    def send(self, entries: Sequence[Entry]) -> None:
+        """Queue entries for the viewers, or drop their rows if the queue is full."""
+        batch = [*self._kept, *entries]
+        try:
+            self._waiting.put_nowait(batch)
+            self._kept = []
+        except queue.Full:
+            self._kept = [entry for entry in batch if isinstance(entry, Always)]
+            self.dropped += sum(len(entry.time) for entry in entries if not isinstance(entry, Always))
+
+    def _run(self) -> None:
+        while (batch := self._waiting.get()) is not None:
+            send(self._stream, batch)
+
+    def close(self) -> None:
+        """Let the viewers have what waits, as long as they take it, and end the server."""
+        if not self._thread.is_alive():
+            return
+        try:
+            self._waiting.put(None, timeout=STOP_S)
+        except queue.Full:
+            return  # the thread stands still in the stream; it is a daemon and ends with the program
+        self._thread.join(STOP_S)
+        if not self._thread.is_alive():
+            self._stream.disconnect()
+
+
+def _free_port(host: str, port: int) -> int:
+    """The port itself, or a free one for 0; raises OSError when it is taken, which Rerun would only log."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            raise OSError(error.errno, f"the viewer's server cannot use {host}:{port}: {error.strerror}") from error
+        return int(probe.getsockname()[1])

@@ -1,0 +1,121 @@
+"""The picture in the Rerun viewer: drawn into a session's .rrd file, and served to viewers that come and go."""
+
+from __future__ import annotations
+
+import uuid
+from pathlib import Path
+
+from gateway.picture import Picture
+from gateway.settings import Site
+from gateway.sinks.blueprint import blueprint
+from gateway.sinks.feed import FileFeed, Identity, ServedFeed
+from gateway.sinks.scene.entry import Entry
+from gateway.sinks.scene.flown import Flights
+from gateway.sinks.scene.paths import ApproachScene, PredictScene
+from gateway.sinks.scene.site import SiteScene
+from gateway.sinks.scene.sources import SourceScene
+from gateway.sinks.scene.stages import StageScene
+from gateway.sinks.scene.tracks import TrackScene
+
+
+class RerunSink:
+    """Draws pictures of one site, into a file, for viewers, or both.
+
+    Pictures are gathered for `period_s` of session time or until `rows_limit` rows of tracks and raw
+    positions wait, then drawn as columns: 0.4 s for people who watch, 10 s where a recording is replayed as
+    fast as it goes (an entity costs the same for one row as for a hundred). `serve` is (host, port) to listen
+    on, port 0 for a free one.
+
+    The file is written in the caller's thread and never drops; `write`, `flush` and `close` raise OSError
+    when the disk does not take it. Viewers are fed from a thread of their own and can slow nothing: what they
+    do not take is dropped and counted in `dropped`.
+    """
+
+    def __init__(
+        self,
+        site: Site,
+        *,
+        path: Path | None = None,
+        serve: tuple[str, int] | None = None,
+        application: str = "talkdown",
+        recording: str | None = None,
+        name: str | None = None,
+        memory_limit: str = "256MiB",
+        period_s: float = 0.4,
+        rows_limit: int = 256,
+    ) -> None:
+        identity = Identity(application, recording or str(uuid.uuid4()), name or site.name)
+        views = blueprint(site)
+        self._served = ServedFeed(*serve, identity, views, memory_limit) if serve else None
+        try:
+            self._file = FileFeed(path, identity, views) if path else None
+        except OSError:
+            if self._served:
+                self._served.close()
+            raise
+        self._flights, self._sources, self._tracks = Flights(site), SourceScene(site), TrackScene(site)
+        self._approach, self._predict, self._stages = ApproachScene(site), PredictScene(site), StageScene(site)
+        self._period_ns, self._rows_limit = round(period_s * 1e9), rows_limit
+        self._waiting: list[Picture] = []
+        self._rows = 0
+        self._drawn_at: int | None = None
+        self._send(list(SiteScene(site).entries()))
+
+    @property
+    def address(self) -> str | None:
+        """What a viewer opens, such as "rerun+http://127.0.0.1:41234/proxy"; None when nothing is served."""
+        return self._served.address if self._served else None
+
+    @property
+    def dropped(self) -> int:
+        """Rows that viewers did not take in time; the file has them."""
+        return self._served.dropped if self._served else 0
+
+    def write(self, picture: Picture) -> None:
+        """Take one picture; raises OSError when the file could not be written."""
+        self._waiting.append(picture)
+        self._rows += len(picture.fuse.time) + len(picture.align.report_time) + len(picture.align.plot_time)
+        self.flush(picture.now)
+
+    def flush(self, now: int) -> None:
+        """Draw what waits if a period has passed until `now` (session time, ns) or many rows wait."""
+        if self._drawn_at is None:
+            self._drawn_at = now
+        if self._rows >= self._rows_limit or now - self._drawn_at >= self._period_ns:
+            self._drawn_at = now
+            self._draw()
+
+    def close(self) -> None:
+        """Draw what waits, end the file and the server; calling it again does nothing."""
+        try:
+            self._draw()
+        finally:
+            try:
+                if self._file:
+                    self._file.close()
+            finally:
+                if self._served:
+                    self._served.close()
+
+    def _draw(self) -> None:
+        pictures, self._waiting, self._rows = self._waiting, [], 0
+        if not pictures:
+            return
+        flights = self._flights.gather(pictures)
+        entries: list[Entry] = [
+            *self._sources.entries(pictures),
+            *self._tracks.entries(flights),
+            *self._approach.entries(flights),
+            *self._predict.entries(pictures, flights),
+            *self._stages.entries(pictures, flights),
+        ]
+        for ended in (ended for picture in pictures for ended in picture.fuse.ended):
+            for scene in (self._flights, self._tracks, self._predict):
+                scene.forget(ended.track)
+        self._send(entries)
+
+    def _send(self, entries: list[Entry]) -> None:
+        if self._served:
+            self._served.send(entries)
+        if self._file:
+            self._file.send(entries)

@@ -1,0 +1,158 @@
+"""Where tracks should be and where they will be: /approach/{track} and /predict/{track}."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from gateway.frames import RunwayFrame
+from gateway.picture import Picture
+from gateway.predict import Predicted
+from gateway.settings import Site
+from gateway.sinks.approach import deviations
+from gateway.sinks.scene import style
+from gateway.sinks.scene.entry import Always, Entry, entity, rows
+from gateway.sinks.scene.flown import BEFORE_ALL, Flown
+
+Floats = NDArray[np.float64]
+
+_CIRCLE = np.stack([f(np.linspace(0.0, 2.0 * math.pi, 25)) for f in (np.cos, np.sin)] + [np.zeros(25)], axis=-1)
+
+
+class ApproachScene:
+    """Plots how far each track is off its glide path and the centreline, in lengths and in angles."""
+
+    def __init__(self, site: Site) -> None:
+        self._runway, self._units = site.runway, style.units_of(site)
+        self._named: set[int] = set()
+
+    def entries(self, flights: Sequence[Flown]) -> list[Entry]:
+        """The rows of those tracks that are on the approach."""
+        entries: list[Entry] = []
+        for flown in flights:
+            off = deviations(self._runway, flown.runway_m, flown.velocity_mps[:, 0])
+            known = np.isfinite(off.distance_m)
+            if not known.any():
+                continue
+            if flown.track not in self._named:
+                self._named.add(flown.track)
+                entries += self._looks(flown.track)
+            length, distance = self._units.lengths, self._units.distances
+            for path, columns in (
+                (entity("approach", flown.track), (off.vertical_m * length, off.lateral_m * length)),
+                (entity("approach", "angle", flown.track), (np.degrees(off.vertical_rad), np.degrees(off.lateral_rad))),
+                (entity("approach", "distance", flown.track), (off.distance_m * distance,)),
+            ):
+                plotted = rr.Scalars.columns(scalars=np.stack(columns, axis=-1)[known])
+                entries.append(rows(path, flown.time[known], flown.step[known], plotted))
+        return entries
+
+    def _looks(self, track: int) -> list[Entry]:
+        colours = [style.VERTICAL, style.HORIZONTAL]
+        kinds = ("above glide path", "left of centreline")
+        metres = [f"track {track} {kind}, {self._units.length}" for kind in kinds]
+        degrees = [f"track {track} {kind}, degrees" for kind in kinds]
+        distance = f"track {track} to threshold, {self._units.distance}"
+        return [
+            Always(entity("approach", track), (rr.SeriesLines(names=metres, colors=colours),)),
+            Always(entity("approach", "angle", track), (rr.SeriesLines(names=degrees, colors=colours),)),
+            Always(entity("approach", "distance", track), (rr.SeriesLines(names=distance),)),
+        ]
+
+
+class PredictScene:
+    """Draws the newest prediction of each track: its path, its corridor of one sigma, and a ring at each point."""
+
+    def __init__(self, site: Site) -> None:
+        self._frame = RunwayFrame(site.runway)
+        self._newest: dict[int, int] = {}
+        self._here: dict[int, Floats] = {}  # the last position of each track: where its prediction starts
+        self._looked: set[int] = set()
+
+    def entries(self, pictures: Sequence[Picture], flights: Sequence[Flown]) -> list[Entry]:
+        """The predictions that these pictures add; each stands until the next one is made."""
+        known = {flown.track: flown for flown in flights}
+        found: dict[int, list[tuple[int, int, list[Floats]]]] = {}
+        for picture in pictures:
+            for track, made, strips in self._made(picture.predict, known):
+                found.setdefault(track, []).append((made, picture.step, strips))
+        for flown in flights:
+            self._here[flown.track] = flown.runway_m[-1]
+        entries: list[Entry] = []
+        for track, told in found.items():
+            entries += self._rows(track, told)
+        return entries
+
+    def forget(self, track: int) -> None:
+        """A track ended; its number is never used again."""
+        self._newest.pop(track, None)
+        self._here.pop(track, None)
+
+    def _made(self, predicted: Predicted, known: dict[int, Flown]) -> list[tuple[int, int, list[Floats]]]:
+        """The strips of each prediction in one picture: (track, made, strips)."""
+        if not len(predicted.made):
+            return []
+        found = []
+        keys = np.stack([predicted.track, predicted.made], axis=-1)
+        for track, made in dict.fromkeys(map(tuple, keys.tolist())):
+            if made < self._newest.get(track, BEFORE_ALL):
+                continue
+            self._newest[track] = made
+            index = np.flatnonzero((predicted.track == track) & (predicted.made == made))
+            methods = dict.fromkeys(predicted.method[row] for row in index)
+            strips: list[Floats] = []
+            for method in methods:
+                mine = index[[predicted.method[row] == method for row in index]]
+                mine = mine[np.argsort(predicted.horizon_s[mine], kind="stable")]
+                start = self._start(track, made, known)
+                strips += corridor(start, predicted.runway_m[mine], predicted.sigma_m[mine])
+            found.append((track, made, strips))
+        return found
+
+    def _start(self, track: int, made: int, known: dict[int, Flown]) -> Floats | None:
+        flown = known.get(track)
+        if flown is not None:
+            row = int(np.searchsorted(flown.time, made, side="right")) - 1
+            if row >= 0:
+                return np.asarray(flown.runway_m[row])
+        return self._here.get(track)
+
+    def _rows(self, track: int, told: list[tuple[int, int, list[Floats]]]) -> list[Entry]:
+        path = entity("predict", track)
+        look = style.PREDICTED
+        time, step = np.array([one[0] for one in told]), np.array([one[1] for one in told])
+        lengths = [len(strips) for _, _, strips in told]
+        strips = [strip for _, _, part in told for strip in part]
+        ends = np.cumsum([len(strip) for strip in strips])[:-1]
+        latitude, longitude, _ = self._frame.geodetic_from_runway(np.concatenate(strips))
+        ground = np.split(np.degrees(np.stack([latitude, longitude], axis=-1)), ends)
+        entries: list[Entry] = []
+        if track not in self._looked:
+            self._looked.add(track)
+            radius = style.points(0.8)
+            line = rr.LineStrips3D.from_fields(colors=look, radii=radius)
+            entries.append(Always(path, (line, rr.GeoLineStrings.from_fields(colors=look, radii=radius))))
+        scene = rr.LineStrips3D.columns(strips=strips).partition(lengths)
+        on_map = rr.GeoLineStrings.columns(line_strings=ground).partition(lengths)
+        return [*entries, rows(path, time, step, scene, on_map)]
+
+
+def corridor(start: Floats | None, ahead_m: Floats, sigma_m: Floats) -> list[Floats]:
+    """A predicted path as lines (k, 3): the path, its edges at one sigma to either side, a ring at each point.
+
+    `ahead_m` (n, 3) in the order of time, `sigma_m` (n,); `start` (3,) is where the track is now, if that is
+    known.
+    """
+    path = ahead_m if start is None else np.concatenate([start[None], ahead_m])
+    sigma = sigma_m if start is None else np.concatenate([[0.0], sigma_m])
+    rings = [point + radius * _CIRCLE for point, radius in zip(ahead_m, sigma_m, strict=True) if radius > 0.0]
+    if len(path) < 2:
+        return [np.repeat(path, 2, axis=0), *rings]
+    along = np.gradient(path[:, :2], axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    aside = np.stack([-along[:, 1], along[:, 0], np.zeros(len(path))], axis=-1) * np.nan_to_num(sigma)[:, None]
+    return [path, path + aside, path - aside, *rings]

@@ -1,0 +1,126 @@
+"""What the sources said, and what a simulator says was true: /raw, /align, /truth."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from gateway.frames import RunwayFrame
+from gateway.observation import GpsReport, RadarPlot, Truth
+from gateway.picture import Picture
+from gateway.settings import Site
+from gateway.sinks.scene import style
+from gateway.sinks.scene.entry import Always, Entry, entity, in_order, rows
+from gateway.sinks.scene.trail import Trail
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def raw_path(source: str) -> str:
+    """The entity of an aircraft's own positions, or of a radar track "1/3"."""
+    radar, slash, number = source.partition("/")
+    return entity("raw", "radar", radar, number) if slash and radar.isdigit() else entity("raw", "gps", source)
+
+
+class SourceScene:
+    """Draws raw positions and truth; remembers the trail of each."""
+
+    def __init__(self, site: Site) -> None:
+        self._frame = RunwayFrame(site.runway)
+        self._geoid_m = site.runway.geoid_separation_m or 0.0
+        self._trails: dict[str, Trail] = {}
+        self._named: set[str] = set()
+
+    def entries(self, pictures: Sequence[Picture]) -> list[Entry]:
+        """The rows that these pictures add."""
+        return [*self._raw(pictures), *self._lateness(pictures), *self._truth(pictures)]
+
+    def _raw(self, pictures: Sequence[Picture]) -> list[Entry]:
+        names: list[str] = []
+        for picture in pictures:
+            names += picture.align.report_aircraft
+            names += picture.align.plot_radar_track
+        if not names:
+            return []
+        aligned = [picture.align for picture in pictures]
+        time = np.concatenate([part for one in aligned for part in (one.report_time, one.plot_time)])
+        place = np.concatenate([part for one in aligned for part in (one.report_runway_m, one.plot_runway_m)])
+        counts = [len(one.report_time) + len(one.plot_time) for one in aligned]
+        step = np.repeat([picture.step for picture in pictures], counts)
+        seen = np.asarray(np.isfinite(place).all(axis=1))  # a plot without range or angle has no place in space
+        entries: list[Entry] = []
+        for name, index in _by_name(names, seen):
+            colour = style.RADAR if "raw/radar" in raw_path(name) else style.GPS
+            entries += self._positions(raw_path(name), colour, time[index], step[index], place[index], "points")
+        return entries
+
+    def _truth(self, pictures: Sequence[Picture]) -> list[Entry]:
+        told = [(truth, picture.step) for picture in pictures for truth in picture.truth]
+        if not told:
+            return []
+        latitude = np.array([truth.latitude_rad for truth, _ in told])
+        longitude = np.array([truth.longitude_rad for truth, _ in told])
+        place = self._frame.runway_from_geodetic(latitude, longitude, [self._height_m(truth) for truth, _ in told])
+        time = np.array([truth.valid_at for truth, _ in told], dtype=np.int64)
+        step = np.array([step for _, step in told], dtype=np.int64)
+        entries: list[Entry] = []
+        known = np.asarray(np.isfinite(place).all(axis=1))
+        for name, index in _by_name([truth.aircraft for truth, _ in told], known):
+            path = entity("truth", name)
+            entries += self._positions(path, style.TRUTH, time[index], step[index], place[index], "line")
+        return entries
+
+    def _height_m(self, truth: Truth) -> float:
+        if truth.height_m is not None:
+            return truth.height_m
+        return np.nan if truth.altitude_msl_m is None else truth.altitude_msl_m + self._geoid_m
+
+    def _positions(
+        self, path: str, colour: style.Colour, time: Ints, step: Ints, place: Floats, kind: str
+    ) -> list[Entry]:
+        """The position of one source, now and where it was; in the scene and on the map."""
+        order = in_order(time)
+        time, step, place = time[order], step[order], place[order]
+        latitude, longitude, _ = self._frame.geodetic_from_runway(place)
+        lat_lon = np.degrees(np.stack([latitude, longitude], axis=-1))
+        entries: list[Entry] = []
+        if path not in self._trails:
+            line = kind == "line"
+            self._trails[path] = Trail(path, "line" if line else "points", colour, 1.0 if line else 1.5)
+            look = rr.Points3D.from_fields(colors=colour, radii=style.points(2.0 if line else 3.5))
+            ground = rr.GeoPoints.from_fields(colors=colour, radii=style.points(2.0 if line else 4.0))
+            entries.append(Always(path, (look, ground)))
+        here = rr.Points3D.columns(positions=place)
+        entries.append(rows(path, time, step, here, rr.GeoPoints.columns(positions=lat_lon)))
+        return entries + self._trails[path].extend(time, step, place, lat_lon)
+
+    def _lateness(self, pictures: Sequence[Picture]) -> list[Entry]:
+        """How long after its validity each observation was heard: what alignment has to bridge."""
+        late: dict[str, list[tuple[int, int, float]]] = defaultdict(list)
+        for picture in pictures:
+            for one in picture.observations:
+                if isinstance(one, GpsReport | RadarPlot):
+                    source = one.aircraft if isinstance(one, GpsReport) else f"radar {one.radar}"
+                    late[source].append((one.valid_at, picture.step, 1e-9 * (one.received_at - one.valid_at)))
+        entries: list[Entry] = []
+        for source, told in late.items():
+            path = entity("align", source)
+            if source not in self._named:
+                self._named.add(source)
+                entries.append(Always(path, (rr.SeriesLines(names=f"{source} heard after, s"),)))
+            time, step, lateness = (np.array(column) for column in zip(*sorted(told), strict=True))
+            entries.append(rows(path, time, step, rr.Scalars.columns(scalars=lateness)))
+        return entries
+
+
+def _by_name(names: Sequence[str], wanted: NDArray[np.bool_]) -> list[tuple[str, NDArray[np.intp]]]:
+    """The indexes of the wanted rows of each name, names in the order of their first row."""
+    found: dict[str, list[int]] = {}
+    for index in np.flatnonzero(wanted).tolist():
+        found.setdefault(names[index], []).append(index)
+    return [(name, np.array(index, dtype=np.intp)) for name, index in found.items()]

@@ -1,0 +1,76 @@
+"""Colours, line widths and units of the scene, each in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gateway.settings import Site
+
+Colour = tuple[int, int, int] | tuple[int, int, int, int]
+
+# The three tracks of paper 003's figure 6.
+GPS: Colour = (255, 150, 30)
+RADAR: Colour = (60, 140, 255)
+FUSED: Colour = (235, 50, 50)
+
+TRUTH: Colour = (150, 150, 150)
+PREDICTED: Colour = (255, 140, 160)
+JOINED: Colour = (255, 230, 80)
+TEXT: Colour = (235, 235, 235)
+
+RUNWAY: Colour = (225, 225, 225)
+CENTRELINE: Colour = (120, 160, 130)
+GLIDE_PATH: Colour = (70, 200, 120)
+COVERAGE: Colour = (45, 80, 130)
+DECISION: Colour = (255, 230, 80)
+
+STATES: dict[str, Colour] = {
+    "gps only": GPS,
+    "radar only": RADAR,
+    "fused": FUSED,
+    "coasting": (130, 130, 130),
+    "ended": (60, 60, 60),
+}
+HORIZONTAL: Colour = (190, 120, 255)
+VERTICAL: Colour = (70, 200, 190)
+
+
+def points(size: float) -> float:
+    """A radius that stays the same on the screen at every zoom, in UI points."""
+    return -size
+
+
+@dataclass(frozen=True, slots=True)
+class Units:
+    """What labels and plots speak: the name of each unit, and how many of it are in the SI unit."""
+
+    length: str = "m"
+    lengths: float = 1.0
+    distance: str = "km"
+    distances: float = 1e-3
+    speed: str = "m/s"
+    speeds: float = 1.0
+    climb: str = "m/s"
+    climbs: float = 1.0
+    tick_m: float = 10_000.0  # between marks on the extended centreline
+    ticks: int = 5
+
+
+SI = Units()
+AVIATION = Units(
+    length="ft",
+    lengths=1.0 / 0.3048,
+    distance="NM",
+    distances=1.0 / 1852.0,
+    speed="kn",
+    speeds=3600.0 / 1852.0,
+    climb="ft/min",
+    climbs=60.0 / 0.3048,
+    tick_m=5.0 * 1852.0,
+    ticks=5,
+)
+
+
+def units_of(site: Site) -> Units:
+    """The units that a site file asked for."""
+    return AVIATION if site.units == "aviation" else SI
