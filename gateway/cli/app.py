@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import sys
+from typing import Annotated
 
-import click
 import typer
 
-
-class UsageError(click.ClickException):
-    """Wrong usage or a wrong site file: one sentence on stderr, exit code 2."""
-
-    exit_code = 2
-
-
-class RunError(click.ClickException):
-    """A failure while running: one sentence on stderr, exit code 1."""
-
-    exit_code = 1
-
+from gateway import __version__
+from gateway.cli import demo, live, play, replay, sessions, simulate, site, study
+from gateway.cli.failures import Failure
 
 app = typer.Typer(
     name="talkdown",
@@ -28,9 +19,61 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
+for command in (demo, live, replay, simulate, play, site, study, sessions):
+    command.register(app)
+
+_WRONG_USAGE = typer.BadParameter.__bases__[0]  # click's UsageError, wherever this version of typer keeps its click
+
+
+@app.callback()
+def root(
+    version: Annotated[bool, typer.Option("--version", help="Print the version and end.", is_eager=True)] = False,
+) -> None:
+    """Only there for --version, and so that every command keeps its name."""
 
 
 def run(arguments: list[str]) -> int:
     """Run one command line; the exit code."""
-    raise NotImplementedError
+    if arguments == ["--version"]:
+        print(f"talkdown {__version__}")
+        return 0
+    try:
+        check_packages()
+        result = app(arguments or ["--help"], prog_name="talkdown", standalone_mode=False)
+    except Failure as failure:
+        return _tell(str(failure), failure.exit_code)
+    except typer.Exit as left:
+        return left.exit_code
+    except _WRONG_USAGE as refusal:
+        return _tell(_sentence(refusal), 2)
+    except (KeyboardInterrupt, typer.Abort):
+        return _tell("Stopped at once; `talkdown sessions` on the archive's folder completes what was being written.", 1)
+    except BrokenPipeError:  # the reader of our output has seen enough
+        sys.stderr.close()
+        return 0
+    return result if isinstance(result, int) else 0
+
+
+def check_packages() -> None:
+    """Raise Failure when another distribution's package `adapters` stands where ours should."""
+    found = importlib.import_module("adapters")
+    if getattr(found, "DISTRIBUTION", None) != "talkdown":
+        where = getattr(found, "__file__", None) or "unknown place"
+        raise Failure(
+            f"The package 'adapters' found here is another distribution's ({where}); "
+            "install talkdown in a virtual environment of its own."
+        )
+
+
+def _sentence(refusal: BaseException) -> str:
+    """What the command line's parser says, in one line."""
+    told = getattr(refusal, "format_message", None)
+    text = " ".join((told() if callable(told) else str(refusal)).split())
+    return text if text.endswith((".", "?", "!")) else f"{text}."
+
+
+def _tell(sentence: str, code: int) -> int:
+    print(sentence, file=sys.stderr)
+    return code

@@ -1,0 +1,145 @@
+"""Options that several commands share, with their help, and how they become what the runtime takes."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gateway.cli.failures import UsageError
+
+if TYPE_CHECKING:
+    from gateway.runtime.setup import Place, Serve
+    from gateway.runtime.urls import Url
+    from gateway.settings import Options
+
+
+class Viewer(StrEnum):
+    """How a person looks at the session."""
+
+    native = "native"
+    web = "web"
+    none = "none"
+
+
+class Weighting(StrEnum):
+    """How GPS and radar are weighed against each other."""
+
+    bias = "bias"
+    covariance = "covariance"
+    innovation = "innovation"
+    literal = "literal"
+
+
+class Association(StrEnum):
+    """When a radar track and an aircraft are one."""
+
+    default = "default"
+    literal = "literal"
+
+
+SiteOption = Annotated[
+    Path | None,
+    typer.Option("--site", metavar="FILE", help="Site file (TOML): the runway and the radars. Without one the stream tells.", show_default=False),
+]
+ViewerOption = Annotated[
+    Viewer | None,
+    typer.Option("--viewer", help="native: a window; web: an address for the browser; none. [default: native, web without a screen]", show_default=False),
+]
+ServeOption = Annotated[
+    str | None,
+    typer.Option(
+        "--serve",
+        metavar="HOST:PORT",
+        help="Where viewers find the session, such as 0.0.0.0:9876 for all of a network. [default: this machine only, a free port]",
+        show_default=False,
+    ),
+]
+ArchiveOption = Annotated[
+    Path | None,
+    typer.Option("--archive", metavar="DIR", help="Keep the session: a folder of its own inside DIR.", show_default=False),
+]
+WeightingOption = Annotated[
+    Weighting,
+    typer.Option("--weighting", help="How GPS and radar are weighed: bias estimates the GPS error; the others are paper 003's."),
+]
+AssociationOption = Annotated[
+    Association, typer.Option("--association", help="When a radar track and an aircraft are one: ours, or paper 003's literally.")
+]
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress and no summary; only failures.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the summary as one JSON object.")]
+
+
+def read_place(path: Path | None) -> Place | None:
+    """The site file's place. Raises UsageError."""
+    if path is None:
+        return None
+    from gateway.runtime.setup import Place
+    from gateway.settings import SiteError, parse_site
+
+    try:
+        text = path.read_text(encoding="utf-8")
+        return Place(parse_site(text, str(path)), text, str(path))
+    except SiteError as error:
+        raise UsageError(str(error)) from error
+    except FileNotFoundError as error:
+        raise UsageError(f"There is no site file {path}; `talkdown site` writes one to start from.") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"The site file {path} cannot be read: {error}.") from error
+
+
+def read_keys(place: Place | None, site_path: Path | None) -> dict[int, bytes]:
+    """The keys of the site's radars by number; key files stand beside the site file. Raises UsageError."""
+    keys: dict[int, bytes] = {}
+    for radar in place.site.radars if place and site_path else ():
+        if radar.key_file and site_path:
+            path = site_path.parent / radar.key_file
+            try:
+                keys[radar.number] = path.read_bytes().strip()
+            except OSError as error:
+                raise UsageError(f"The key file of radar {radar.number}, {path}, cannot be read: {error.strerror}.") from error
+            if not keys[radar.number]:
+                raise UsageError(f"The key file of radar {radar.number}, {path}, is empty.")
+    return keys
+
+
+def read_urls(texts: list[str], default_port: int) -> list[Url]:
+    """The links that the texts describe. Raises UsageError."""
+    from gateway.runtime.urls import LinkError, parse_url
+
+    try:
+        return [parse_url(text, default_port) for text in texts]
+    except LinkError as error:
+        raise UsageError(str(error)) from error
+
+
+def choose(weighting: Weighting, association: Association) -> Options:
+    """The options of a run."""
+    from gateway.settings import Options
+
+    return Options(weighting=weighting.value, association=association.value)
+
+
+def read_serve(text: str | None, viewer: Viewer) -> Serve | None:
+    """Where to serve viewers: as told, else on this machine when there is a viewer. Raises UsageError."""
+    from gateway.runtime.setup import Serve
+
+    if text is None:
+        return None if viewer is Viewer.none else Serve()
+    host, colon, port = text.rpartition(":")
+    if not colon or not host or not port.isdigit() or int(port) > 65535:
+        raise UsageError(f"--serve {text!r} is not HOST:PORT; write 127.0.0.1:9876 for this machine, 0.0.0.0:9876 for its network.")
+    return Serve(host.strip("[]"), int(port))
+
+
+def change(options: Options, weighting: Weighting | None, association: Association | None) -> Options:
+    """The options with what was asked for in place of what was archived."""
+    from dataclasses import replace
+
+    if weighting is not None:
+        options = replace(options, weighting=weighting.value)
+    if association is not None:
+        options = replace(options, association=association.value)
+    return options

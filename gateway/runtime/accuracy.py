@@ -1,0 +1,152 @@
+"""How far GPS reports, radar plots and the fused track were from the truth, where a simulator tells it.
+
+Only read from pictures, never fed back. Scores are settled every few seconds, so memory does not grow with the pictures:
+one float an error remains.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.frames import RunwayFrame
+from gateway.observation import Truth
+from gateway.picture import Picture
+from gateway.settings import Runway
+
+_SETTLE_NS = 5_000_000_000
+_WAIT_FOR_TRUTH_NS = 15_000_000_000  # what no truth has caught up with by then is not scored
+_LARGEST_GAP_NS = 2_000_000_000  # between two truths that are interpolated
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """Distances to the truth in three dimensions, metres."""
+
+    count: int
+    rmse_m: float
+    median_m: float
+    p95_m: float
+
+
+class _Truths:
+    """What is known of one aircraft's true path, not yet settled: times, positions in the runway frame."""
+
+    __slots__ = ("height_m", "latitude_rad", "longitude_rad", "msl", "time")
+
+    def __init__(self) -> None:
+        self.time: list[int] = []
+        self.latitude_rad: list[float] = []
+        self.longitude_rad: list[float] = []
+        self.height_m: list[float] = []
+        self.msl: list[bool] = []
+
+    def add(self, truth: Truth) -> None:
+        if self.time and truth.valid_at <= self.time[-1]:
+            return  # repeated, or out of order: rare, and the neighbours tell nearly the same
+        height = truth.height_m if truth.height_m is not None else truth.altitude_msl_m
+        if height is None:
+            return
+        self.time.append(truth.valid_at)
+        self.latitude_rad.append(truth.latitude_rad)
+        self.longitude_rad.append(truth.longitude_rad)
+        self.height_m.append(height)
+        self.msl.append(truth.height_m is None)
+
+    def forget_before(self, time: int) -> None:
+        keep = int(np.searchsorted(np.array(self.time, dtype=np.int64), time))
+        for column in (self.time, self.latitude_rad, self.longitude_rad, self.height_m, self.msl):
+            del column[: max(keep - 1, 0)]
+
+
+class Accuracy:
+    """Gathers from pictures; `scores` at the end."""
+
+    def __init__(self, runway: Runway) -> None:
+        self._frame = RunwayFrame(runway)
+        self._separation_m = runway.geoid_separation_m or 0.0
+        self._separation_is_given = runway.geoid_separation_m is not None
+        self._truths: defaultdict[str, _Truths] = defaultdict(_Truths)
+        self._waiting: defaultdict[tuple[str, str], list[tuple[int, Floats]]] = defaultdict(list)
+        self._errors: defaultdict[str, array[float]] = defaultdict(lambda: array("f"))
+        self._settled_at: int | None = None
+
+    def add(self, picture: Picture) -> None:
+        """Take from a picture what can be scored."""
+        for truth in picture.truth:
+            self._truths[truth.aircraft].add(truth)
+        if self._truths:
+            self._gather(picture)
+        if self._settled_at is None:
+            self._settled_at = picture.now
+        elif picture.now - self._settled_at >= _SETTLE_NS:
+            self._settled_at = picture.now
+            self._settle(picture.now)
+
+    def _gather(self, picture: Picture) -> None:
+        align, fuse = picture.align, picture.fuse
+        self._wait("gps", align.report_aircraft, align.report_time, align.report_runway_m)
+        aircraft_of = {radar_track: aircraft for aircraft, radar_track in picture.associate.pairs}
+        plots_of = [aircraft_of.get(radar_track) for radar_track in align.plot_radar_track]
+        self._wait("radar", plots_of, align.plot_time, align.plot_runway_m)
+        states = np.array(fuse.state, dtype=object)
+        for state in set(fuse.state):
+            rows = np.flatnonzero(states == state)
+            self._wait(state, [fuse.aircraft[row] for row in rows], fuse.time[rows], fuse.runway_m[rows])
+        if not self._separation_is_given and len(fuse.time):
+            separations = (fuse.height_m - fuse.altitude_msl_m)[np.isfinite(fuse.altitude_msl_m)]
+            if len(separations) and np.isfinite(separations[-1]):
+                self._separation_m = float(separations[-1])
+
+    def _wait(self, kind: str, aircraft: Iterable[str | None], times: NDArray[np.int64], runway_m: Floats) -> None:
+        for name, time, position in zip(aircraft, times, runway_m, strict=True):
+            if name is not None:
+                self._waiting[name, kind].append((int(time), position))
+
+    def _settle(self, now: int) -> None:
+        """Score what the truth has caught up with, and let go of what it will not."""
+        for (aircraft, kind), rows in self._waiting.items():
+            truths = self._truths.get(aircraft)
+            if truths is None or not truths.time or not rows:
+                rows[:] = [row for row in rows if row[0] > now - _WAIT_FOR_TRUTH_NS]
+                continue
+            ready = [row for row in rows if row[0] <= truths.time[-1]]
+            rows[:] = [row for row in rows if max(truths.time[-1], now - _WAIT_FOR_TRUTH_NS) < row[0]]
+            if ready:
+                errors = self._distances(truths, ready)
+                self._errors[kind].extend(float(error) for error in errors[np.isfinite(errors)])
+        for truths in self._truths.values():
+            truths.forget_before(min(now - _WAIT_FOR_TRUTH_NS, truths.time[-1]) if truths.time else 0)
+
+    def _distances(self, truths: _Truths, rows: list[tuple[int, Floats]]) -> Floats:
+        """Distance of each row to the interpolated truth (m); NaN where the truth has a gap, or the row a component less."""
+        known = np.array(truths.time, dtype=np.int64)
+        height = np.array(truths.height_m) + np.where(truths.msl, self._separation_m, 0.0)
+        path = self._frame.runway_from_geodetic(truths.latitude_rad, truths.longitude_rad, height)
+        times = np.array([time for time, _ in rows], dtype=np.int64)
+        after = np.clip(np.searchsorted(known, times), 1, max(len(known) - 1, 1))
+        if len(known) < 2:
+            return np.full(len(rows), np.nan)
+        gap = known[after] - known[after - 1]
+        share = (times - known[after - 1]) / gap
+        inside = (gap <= _LARGEST_GAP_NS) & (share >= 0.0) & (share <= 1.0)
+        there = path[after - 1] + share[:, None] * (path[after] - path[after - 1])
+        return np.where(inside, np.linalg.norm(np.array([row for _, row in rows]) - there, axis=1), np.nan)
+
+    def scores(self) -> dict[str, Score]:
+        """Scores by what was scored: "gps", "radar", and the fused track by its state ("fused", "gps only", ...)."""
+        if self._settled_at is not None:
+            self._settle(self._settled_at + _SETTLE_NS)
+        return {kind: _score(np.array(self._errors[kind], dtype=np.float64)) for kind in sorted(self._errors) if self._errors[kind]}
+
+
+def _score(errors: Floats) -> Score:
+    median, p95 = np.quantile(errors, [0.5, 0.95])
+    return Score(len(errors), float(np.sqrt(np.mean(errors**2))), float(median), float(p95))

@@ -1,0 +1,175 @@
+"""The loops that drive a session: live, in ticks of at most 20 ms; replayed, as fast as it goes or at the pace of old."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+
+from adapters import Arrival
+from gateway.picture import Picture
+from gateway.runtime.links import Link
+from gateway.runtime.playback import Playback
+from gateway.runtime.receiver import Receiver
+from gateway.runtime.run import Run
+from gateway.runtime.setup import RunFailure, Setup
+from gateway.runtime.summary import Summary
+
+TICK_S = 0.02
+_REPLAY_STEP_NS = 1_000_000_000  # of stamps, at full speed: large steps are cheap steps
+_PACED_STEP_NS = 40_000_000
+_NO_PLACE_AFTER_S = 60.0
+
+Watch = Callable[[Run, Picture | None], None]
+"""What a caller does after each step: show progress, tell events. It must not take long."""
+AskedToStop = Callable[[], str | None]
+
+
+def _nobody(run: Run, picture: Picture | None) -> None:
+    """Nobody watches."""
+
+
+def _never() -> str | None:
+    return None
+
+
+def run_live(
+    mavlink: Sequence[Link],
+    radar: Sequence[Link],
+    setup: Setup,
+    *,
+    seconds: float | None = None,
+    watch: Watch = _nobody,
+    asked_to_stop: AskedToStop = _never,
+    no_place_after_s: float = _NO_PLACE_AFTER_S,
+) -> Summary:
+    """Fuse what open links bring until asked to stop, or for so many seconds; closes the links.
+
+    Raises RunFailure when the archive cannot be written, or the stream does not tell where we are.
+    """
+    receiver = Receiver(mavlink, radar)
+    try:
+        run = Run(setup, receiver.started_at)
+        with _Abandoning(run):
+            receiver.start()
+            ended = _live(receiver, run, seconds, watch, asked_to_stop, no_place_after_s)
+            receiver.close()
+            _tick(receiver, run)
+            return run.finish(ended)
+    finally:
+        receiver.close()
+
+
+def _live(
+    receiver: Receiver,
+    run: Run,
+    seconds: float | None,
+    watch: Watch,
+    asked_to_stop: AskedToStop,
+    no_place_after_s: float,
+) -> str:
+    """Tick until the end; how it ended."""
+    began = time.monotonic()
+    while True:
+        tick_began = time.monotonic()
+        watch(run, _tick(receiver, run))
+        if run.place is None and run.heard_for_s > no_place_after_s:
+            raise RunFailure(
+                "Nothing that came in tells where the runway is (no HOME_POSITION, no mission, nobody standing still); "
+                "give a site file with --site, `talkdown site` writes one to start from."
+            )
+        if asker := asked_to_stop():
+            return f"stopped by {asker}"
+        if seconds is not None and tick_began - began >= seconds:
+            return "done"
+        time.sleep(max(0.0, TICK_S - (time.monotonic() - tick_began)))
+
+
+def _tick(receiver: Receiver, run: Run) -> Picture | None:
+    delivery = receiver.drain()
+    for source in delivery.sources:
+        run.add(source)
+    run.count(receiver.counters())
+    return run.work(delivery.arrivals, delivery.watermark, delivery.notes)
+
+
+def run_replay(
+    playback: Playback,
+    setup: Setup,
+    *,
+    speed: float | None = None,
+    watch: Watch = _nobody,
+    asked_to_stop: AskedToStop = _never,
+    step_ns: int | None = None,
+) -> Summary:
+    """Run recordings again: as fast as it goes, or at `speed` times their own pace. Any `step_ns` gives the same numbers.
+
+    Raises RunFailure when the archive cannot be written.
+    """
+    if step_ns is None:
+        step_ns = _REPLAY_STEP_NS if speed is None else max(int(_PACED_STEP_NS * speed), 1)
+    run = Run(setup, playback.started_at)
+    with _Abandoning(run):
+        for source in playback.sources:
+            run.add(source)
+        began, ended = time.monotonic(), "done"
+        for arrivals, watermark in steps(playback.arrivals(), playback.started_at, step_ns, idle=speed is not None):
+            if speed is not None:
+                _wait_until(began + (watermark - playback.started_at) / 1e9 / speed, asked_to_stop)
+            if asker := asked_to_stop():
+                ended = f"stopped by {asker}"
+                break
+            watch(run, run.work(arrivals, watermark))
+        else:
+            if playback.watermark is not None:
+                watch(run, run.work([], playback.watermark))
+        if run.place is None and ended == "done":
+            raise RunFailure("Nothing in this recording tells where the runway is; give a site file with --site.")
+        return run.finish(ended)
+
+
+def steps(
+    arrivals: Iterable[Arrival], started_at: int, step_ns: int, *, idle: bool = False
+) -> Iterator[tuple[list[Arrival], int]]:
+    """Arrivals in order, cut at multiples of `step_ns` after the start; with each the watermark that its cut implies.
+
+    A silence makes one long step, or with `idle` many empty ones. `step_ns` 0 gives every arrival a step of its own.
+    """
+    gathered: list[Arrival] = []
+    cut = started_at + step_ns
+    for arrival in arrivals:
+        if not step_ns:
+            # Arrivals of foreign recordings share stamps: the watermark stays below those still to come.
+            if gathered:
+                yield gathered, min(gathered[-1].received_at, arrival.received_at - 1)
+            gathered = [arrival]
+            continue
+        while arrival.received_at > cut:
+            if gathered or idle:
+                yield gathered, cut
+                gathered = []
+            late = arrival.received_at - cut
+            cut += step_ns if idle else -(-late // step_ns) * step_ns
+        gathered.append(arrival)
+    if gathered:
+        yield gathered, gathered[-1].received_at
+
+
+def _wait_until(monotonic_s: float, asked_to_stop: AskedToStop) -> None:
+    """Sleep, but not past a request to stop by more than a moment."""
+    while (left := monotonic_s - time.monotonic()) > 0 and not asked_to_stop():
+        time.sleep(min(left, 0.1))
+
+
+class _Abandoning:
+    """A run that leaves by an exception is closed as far as it can be."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, KeyboardInterrupt) or kind is None:
+            return  # at once means at once: what was flushed is on the disk
+        self._run.abandon(f"failed: {error}")

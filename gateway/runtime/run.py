@@ -1,0 +1,226 @@
+"""One session at work: arrivals and a watermark in, a picture out to the sinks, everything recorded on the way.
+
+The loop, live or replayed, calls `work` again and again; how it cuts the arrivals into calls cannot change a number.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from adapters import Arrival, Source
+from adapters.decode import Decoder
+from gateway import __version__
+from gateway.observation import Heard
+from gateway.picture import Picture
+from gateway.pipeline import State, initial, step
+from gateway.runtime.folder import Record, make_folder, session_name
+from gateway.runtime.outputs import Outputs
+from gateway.runtime.places import PlaceFinder
+from gateway.runtime.recorder import Recorder
+from gateway.runtime.setup import Place, RunFailure, Setup
+from gateway.runtime.summary import Summary, Tally
+
+_FLUSH_NS = 500_000_000  # of wall time: half of the second that a kill may cost
+
+
+class Run:
+    """From the first arrival to the summary. Raises RunFailure when the disk refuses; what was written stays whole."""
+
+    def __init__(self, setup: Setup, started_at: int) -> None:
+        self.setup = setup
+        self.started_at = started_at
+        self.place: Place | None = None
+        self.folder: Path | None = None
+        self.outputs: Outputs | None = None
+        self._wall_began = time.monotonic_ns()
+        self._flushed = self._wall_began
+        self._watermark = started_at
+        self._first_at: int | None = None
+        self._sources: dict[int, Source] = {}
+        self._arrivals: dict[int, int] = {}
+        self._decoder = Decoder([], keys=setup.keys, live=setup.live)
+        self._state: State | None = None
+        self._tally: Tally | None = None
+        self._held: list[Heard] = []
+        self._finder = PlaceFinder()
+        self._recorder: Recorder | None = None
+        self._link_counters: dict[str, int] = {}
+        if setup.archive is not None:
+            name = setup.name or (setup.place.site.name if setup.place else "")
+            self.folder = make_folder(setup.archive, session_name(started_at, name))
+            self._recorder = self._record_into(self.folder)
+        if setup.place is not None:
+            self._settle(setup.place)
+
+    @property
+    def heard_for_s(self) -> float:
+        """How long ago the first arrival was, in s of the session; 0 before it."""
+        return 0.0 if self._first_at is None else (self._watermark - self._first_at) / 1e9
+
+    def _record_into(self, folder: Path) -> Recorder:
+        record = Record(__version__, self.setup.command, self.setup.options, self.started_at)
+        try:
+            return Recorder(folder, record)
+        except OSError as error:
+            raise self._failure(error) from error
+
+    def _settle(self, place: Place) -> None:
+        """From now on the place is known: the pipeline and the sinks can begin."""
+        self.place = place
+        self._state = initial(place.site, self.setup.options)
+        self._tally = Tally(place.site.runway)
+        if self._recorder is not None:
+            self._recorder.describe(site=place.text, site_origin=place.origin)
+        try:
+            self.outputs = Outputs(place.site, self.folder, self.setup.serve)
+        except OSError as error:
+            raise self._failure(error) from error
+
+    def add(self, source: Source) -> None:
+        """A source that is new."""
+        self._sources[source.number] = source
+        self._arrivals[source.number] = 0
+        self._decoder.add(source)
+        if self._recorder is not None:
+            try:
+                self._recorder.add(source)
+            except OSError as error:
+                raise self._failure(error) from error
+
+    def work(
+        self, arrivals: Sequence[Arrival], watermark: int, notes: tuple[tuple[str, str], ...] = ()
+    ) -> Picture | None:
+        """Take in arrivals and the watermark after them; the picture, or None while the place is not known.
+
+        `notes` are (level, text) of the links, to be told once.
+        """
+        heard = [decoded for arrival in arrivals if (decoded := self._take(arrival)) is not None]
+        self._watermark = max(self._watermark, watermark)
+        mark = self._decoder.watermark(self._watermark)
+        heard.append(replace(mark, notes=(*mark.notes, *notes)) if notes else mark)
+        if self._state is None:
+            self._hold(heard)
+            heard = self._held
+            if self._state is None:
+                self._flush_when_due()
+                return None
+            self._held = []
+        return self._step(heard)
+
+    def _take(self, arrival: Arrival) -> Heard | None:
+        """Record and decode one arrival; None when it holds nothing for the picture."""
+        if self._first_at is None:
+            self._first_at = arrival.received_at
+        self._arrivals[arrival.source] += 1
+        decoded = self._decoder.feed(arrival)
+        if self._recorder is not None:
+            if self._decoder.refused:
+                self._recorder.refuse(arrival)
+            else:
+                self._recorder.keep(arrival)
+        return decoded if decoded.observations or decoded.notes else None
+
+    def _hold(self, heard: list[Heard]) -> None:
+        """Keep what came until it tells where we are."""
+        self._held += heard
+        place = self._finder.look(heard)
+        if place is not None:
+            self._settle(place)
+
+    def _step(self, heard: Sequence[Heard]) -> Picture:
+        assert self._state is not None
+        assert self._tally is not None
+        assert self.outputs is not None
+        health = self._decoder.health(self._watermark)
+        self._state, picture = step(self._state, heard, health)
+        self._tally.add(picture)
+        try:
+            self.outputs.write(picture)
+        except OSError as error:
+            raise self._failure(error) from error
+        self._flush_when_due()
+        return picture
+
+    def _flush_when_due(self) -> None:
+        now = time.monotonic_ns()
+        if now - self._flushed >= _FLUSH_NS:
+            self._flushed = now
+            self.flush()
+
+    def flush(self) -> None:
+        """Hand what was recorded to the operating system, with session.json beside it."""
+        if self._recorder is None:
+            return
+        try:
+            self._recorder.describe(epoch_offset_s=self._decoder.epoch_offset_s)
+            self._recorder.flush(self._watermark, self._counters())
+        except OSError as error:
+            raise self._failure(error) from error
+
+    def count(self, counters: dict[str, int]) -> None:
+        """What the links have lost so far, totals by reason."""
+        self._link_counters = counters
+
+    def _counters(self) -> dict[str, int]:
+        return {**self._link_counters, **self._decoder.counters()}
+
+    def _failure(self, error: OSError) -> RunFailure:
+        where = self.folder or error.filename or "the archive"
+        reason = (error.strerror or str(error)).lower()
+        return RunFailure(f"{where} could not be written ({reason}); the session ends here, what was written is whole.")
+
+    def finish(self, ended: str) -> Summary:
+        """Close everything, make the Parquet files, complete session.json; the summary."""
+        self.flush()
+        try:
+            if self.outputs is not None:
+                self.outputs.close()
+            summary = self._summary(ended)
+            if self._recorder is not None:
+                self._recorder.describe(ended=ended, summary=summary.document())
+                self._recorder.flush(self._watermark, self._counters())
+                self._recorder.close()
+        except OSError as error:
+            raise self._failure(error) from error
+        return summary
+
+    def abandon(self, ended: str) -> None:
+        """Close what can still be closed after a failure. The next command that touches the session completes it."""
+        if self.outputs is not None:
+            with contextlib.suppress(OSError):  # the failure that brought us here is the one that is told
+                self.outputs.abandon()
+        if self._recorder is not None:
+            self._recorder.describe(watermark=self._watermark)
+            self._recorder.abandon(ended)
+
+    def _summary(self, ended: str) -> Summary:
+        tally = self._tally
+        began = self.started_at if self._first_at is None else self._first_at
+        rows = tuple(
+            {"number": source.number, "kind": source.kind, "name": source.name, "origin": source.origin}
+            | {"arrivals": self._arrivals[source.number]}
+            for source in self._sources.values()
+        )
+        return Summary(
+            ended=ended,
+            duration_s=(self._watermark - began) / 1e9,
+            wall_s=(time.monotonic_ns() - self._wall_began) / 1e9,
+            site=self.place.site.name if self.place else "",
+            site_origin=self.place.origin if self.place else "",
+            epoch_offset_s=self._decoder.epoch_offset_s or 0,
+            sources=rows,
+            observations=tally.named_observations() if tally else {},
+            tracks=len(tally.tracks) if tally else 0,
+            aircraft=tuple(sorted(tally.aircraft)) if tally else (),
+            track_rows=tally.track_rows if tally else 0,
+            predictions=tally.predictions if tally else 0,
+            associations=tally.changes["associated"] if tally else 0,
+            associations_lost=tally.changes["lost"] if tally else 0,
+            counters=self._counters(),
+            accuracy=tally.accuracy.scores() if tally else {},
+            archive=self.folder,
+        )

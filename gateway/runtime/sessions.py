@@ -1,0 +1,93 @@
+"""The sessions of a folder: listed, and mended where one was killed."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from adapters.files import last_stamp
+from gateway.runtime.folder import SESSION_FILE, FolderError, Record, read_record, write_record
+from gateway.runtime.hold import is_held
+from gateway.runtime.outputs import RRD_FILE
+from gateway.sinks.parquet import finish, unfinished
+
+_OPTIMIZE_TIMEOUT_S = 120.0
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """One session as a list shows it. `mended` says what was done to it just now, "" for nothing."""
+
+    folder: Path
+    record: Record
+    size_bytes: int
+    running: bool
+    mended: str = ""
+
+
+def is_session(folder: Path) -> bool:
+    """Whether a path is a session's folder."""
+    return (folder / SESSION_FILE).is_file()
+
+
+def session_folders(parent: Path) -> list[Path]:
+    """The sessions in a folder (or the folder itself, if it is one), oldest first by name.
+
+    Raises FolderError when there is no such folder.
+    """
+    if is_session(parent):
+        return [parent]
+    if not parent.is_dir():
+        raise FolderError(f"There is no folder {parent}.")
+    return sorted(path for path in parent.iterdir() if is_session(path))
+
+
+def sessions(parent: Path) -> Iterator[Listed]:
+    """Every session of a folder, mended first where it was killed. Raises FolderError, and OSError when mending cannot write."""
+    for folder in session_folders(parent):
+        mended = mend(folder)
+        size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+        record = read_record(folder)
+        yield Listed(folder, record, size, record.ended is None, mended)
+
+
+def mend(folder: Path) -> str:
+    """Complete a session that did not end by itself: Parquet of its streams, its .rrd's footer, session.json.
+
+    Does nothing to one that is complete, or that another process is still writing. Says what was done, "" for nothing.
+    Raises FolderError when it is no session, OSError when the disk refuses.
+    """
+    record = read_record(folder)
+    if record.ended is not None and not unfinished(folder):
+        return ""
+    if is_held(folder, folder / SESSION_FILE):
+        return ""
+    made = finish(folder)
+    _repair_rrd(folder / RRD_FILE)
+    if record.ended is None:
+        write_record(folder, replace(record, ended="killed", watermark=_watermark(folder, record)))
+    tables = ", ".join(path.name for path in made) or "no tables"
+    return f"was not ended properly; completed ({tables})"
+
+
+def _watermark(folder: Path, record: Record) -> int:
+    """How far a killed session goes: what it said last, or its last arrival."""
+    said = record.watermark if record.watermark is not None else record.started_at
+    stamps = [last_stamp(folder / source.file) for source in record.sources if (folder / source.file).exists()]
+    return max([said, *(stamp for stamp in stamps if stamp is not None)])
+
+
+def _repair_rrd(path: Path) -> None:
+    """Give a recording that was cut its footer back; without it the file still opens, so failing here is no failure."""
+    if not path.exists():
+        return
+    part = path.with_name(path.name + ".part")
+    command = [sys.executable, "-m", "rerun", "rrd", "optimize", str(path), "-o", str(part)]
+    try:
+        subprocess.run(command, check=True, capture_output=True, timeout=_OPTIMIZE_TIMEOUT_S)
+        part.replace(path)
+    except (OSError, subprocess.SubprocessError):
+        part.unlink(missing_ok=True)

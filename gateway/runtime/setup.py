@@ -1,0 +1,44 @@
+"""What a session is started with: everything in here is decided before the first byte arrives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from gateway.settings import Options, Site
+
+
+class RunFailure(RuntimeError):
+    """A session that could not go on; the message is one plain sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A site and where it is known from. `text` is the site file that gives exactly this site again."""
+
+    site: Site
+    text: str
+    origin: str
+
+
+@dataclass(frozen=True, slots=True)
+class Serve:
+    """Where the viewers' server listens; port 0 takes a free one."""
+
+    host: str = "127.0.0.1"
+    port: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """How to run. Without a place the stream must tell one; without an archive (a folder of sessions) nothing is kept."""
+
+    place: Place | None = None
+    options: Options = field(default_factory=Options)
+    archive: Path | None = None
+    serve: Serve | None = None  # None: no viewer can come
+    keys: Mapping[int, bytes] = field(default_factory=dict)  # a radar's number -> its key
+    live: bool = False
+    name: str = ""  # of the session's folder; without one the site's
+    command: tuple[str, ...] = ()

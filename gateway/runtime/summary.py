@@ -1,0 +1,87 @@
+"""What a session came to, in numbers: for people at the end, for programs as JSON, and for session.json."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from gateway.observation import Observation
+from gateway.picture import Picture, SourceHealth
+from gateway.runtime.accuracy import Accuracy, Score
+from gateway.settings import Runway
+
+KINDS = {
+    "GpsReport": "GPS reports",
+    "RadarPlot": "radar plots",
+    "RadarStatus": "radar status",
+    "Attitude": "attitudes",
+    "VehicleStatus": "vehicle status",
+    "FlightPlan": "flight plans",
+    "Truth": "truths",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """A session's totals. Times in s of the session, distances in m."""
+
+    ended: str
+    duration_s: float
+    wall_s: float
+    site: str
+    site_origin: str
+    epoch_offset_s: int
+    sources: tuple[dict[str, Any], ...]
+    observations: dict[str, int]
+    tracks: int
+    aircraft: tuple[str, ...]
+    track_rows: int
+    predictions: int
+    associations: int
+    associations_lost: int
+    counters: dict[str, int]
+    accuracy: dict[str, Score] = field(default_factory=dict)
+    archive: Path | None = None
+
+    def document(self) -> dict[str, Any]:
+        """The same as plain values for JSON."""
+        plain = asdict(self)
+        plain["archive"] = None if self.archive is None else str(self.archive)
+        return plain
+
+
+class Tally:
+    """Counts what pictures hold."""
+
+    def __init__(self, runway: Runway) -> None:
+        self.observations: Counter[str] = Counter()
+        self.tracks: set[int] = set()
+        self.aircraft: set[str] = set()
+        self.changes: Counter[str] = Counter()
+        self.track_rows = 0
+        self.predictions = 0
+        self.sources: tuple[SourceHealth, ...] = ()
+        self.accuracy = Accuracy(runway)
+
+    def add(self, picture: Picture) -> None:
+        """Count one picture."""
+        self.observations.update(_kind(observation) for observation in picture.observations)
+        self.observations["Truth"] += len(picture.truth)
+        self.tracks.update(picture.fuse.track.tolist())
+        self.aircraft.update(name for name in picture.fuse.aircraft if name is not None)
+        self.changes.update(change.kind for change in picture.associate.changes)
+        self.track_rows += len(picture.fuse.time)
+        self.predictions += len(picture.predict.made)
+        self.sources = picture.health.sources
+        self.accuracy.add(picture)
+
+    def named_observations(self) -> dict[str, int]:
+        """Counts by what people call them."""
+        return {KINDS.get(kind, kind): number for kind, number in sorted(self.observations.items()) if number}
+
+
+def _kind(observation: Observation) -> str:
+    name = type(observation).__name__
+    return "" if name == "Truth" else name  # truths are counted where the picture keeps them
