@@ -102,8 +102,10 @@ class Geoid:
         return report.height_m if report.height_m is not None else math.nan
 
 
-def place_reports(reports: Sequence[GpsReport], heights_m: Sequence[float], serials: Sequence[int], site: Site, frame: RunwayFrame) -> list[Fix]:
-    """GPS reports as fixes; all reports of a step in one call, since arrays of one cost as much as arrays of a hundred.
+def place_reports(
+    reports: Sequence[GpsReport], heights_m: Sequence[float], site: Site, frame: RunwayFrame
+) -> list[Fix]:
+    """GPS reports as fixes (serial 0); all of a step in one call: arrays of one cost as much as arrays of a hundred.
 
     Source: 003 2.2 eq 1, 2.
     """
@@ -134,7 +136,7 @@ def place_reports(reports: Sequence[GpsReport], heights_m: Sequence[float], seri
         speed = max(report.velocity_sigma_mps or site.position.velocity_sigma_mps, LEAST_VELOCITY_SIGMA_MPS)
         comparable = report.timing in (Timing.UTC, Timing.ENVELOPE)
         fixes.append(
-            Fix(report.valid_at, serials[row], report.received_at, report.aircraft, enu[row], sigma, velocity[row], speed, comparable)
+            Fix(report.valid_at, 0, report.received_at, report.aircraft, enu[row], sigma, velocity[row], speed, comparable)
         )
     return fixes
 
@@ -163,6 +165,17 @@ def radar_from_status(status: RadarStatus, frame: RunwayFrame) -> RadarSite:
     """Where a radar says it stands, as a radar of the site file."""
     x, y, z = frame.runway_from_geodetic(status.latitude_rad, status.longitude_rad, status.height_m).tolist()
     return RadarSite(status.radar, x, y, z, status.compass_boresight_rad)
+
+
+def contradiction(known: RadarSite, said: RadarSite) -> str | None:
+    """How a radar's own word differs from the site file's by more than 30 m or 0.1 degrees, or None."""
+    off_m = math.dist(
+        (known.along_m, known.left_m, known.antenna_height_m), (said.along_m, said.left_m, said.antenna_height_m)
+    )
+    turned = math.degrees(math.remainder(said.compass_boresight_rad - known.compass_boresight_rad, 2.0 * math.pi))
+    parts = [f"stands {off_m:.0f} m elsewhere"] * (off_m > 30.0)
+    parts += [f"looks {turned:+.2f} degrees further right"] * (abs(turned) > 0.1)
+    return " and ".join(parts) or None
 
 
 def bracket(plots: Sequence[Plot], at: int, wait_s: float, back_s: float = 3.0) -> tuple[Floats, Floats]:

@@ -89,6 +89,7 @@ class Span:
     aircraft: str
     since: int
     until: int | None = None
+    index: int = 1  # the how manieth of this radar track
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,23 +190,30 @@ def check_again(state: Association, plot: Plot, tracks: RadarTracks, setting: Se
 
 
 def pruned(state: Association, before: int) -> Association:
-    """The same without checks older than an instant, spans that ended before it, and counters of tracks long gone."""
+    """The same without checks older than an instant and spans that ended before it (the latest of each track stays)."""
     checks = tuple(check for check in state.checks if check.fix.at >= before)
     if len(checks) == len(state.checks):
         return state
-    spans = tuple(span for span in state.ledger.spans if span.until is None or span.until >= before)
-    ledger = replace(state.ledger, spans=spans)
-    return replace(state, checks=checks, ledger=ledger)
+    spans = state.ledger.spans
+    latest = {span.key: span.index for span in spans}
+    kept = tuple(s for s in spans if s.until is None or s.until >= before or s.index == latest[s.key])
+    return replace(state, checks=checks, ledger=replace(state.ledger, spans=kept))
 
 
-def forgotten(state: Association, gone: frozenset[Key], at: int) -> Association:
-    """The same without radar tracks that are no more: their pairs end, their counters are dropped."""
+def missing(state: Association, tracks: RadarTracks) -> frozenset[Key]:
+    """The radar tracks that the ledger knows and that have no plots any more."""
     ledger = state.ledger
-    ending = {key: aircraft for key, aircraft in ledger.pairs.items() if key in gone}
-    counts = {pair: count for pair, count in ledger.counts.items() if pair[1] not in gone}
-    if not ending and len(counts) == len(ledger.counts):
+    known = {*ledger.pairs, *(key for _, key in ledger.counts), *(span.key for span in ledger.spans)}
+    return frozenset(known - tracks.plots.keys())
+
+
+def forgotten(state: Association, gone: frozenset[Key]) -> Association:
+    """The same without radar tracks that are no more: their pairs, spans and counters are dropped."""
+    if not gone:
         return state
-    spans = tuple(replace(span, until=at) if span.until is None and span.key in ending else span for span in ledger.spans)
+    ledger = state.ledger
+    counts = {pair: count for pair, count in ledger.counts.items() if pair[1] not in gone}
+    spans = tuple(span for span in ledger.spans if span.key not in gone)
     pairs = {key: aircraft for key, aircraft in ledger.pairs.items() if key not in gone}
     return replace(state, ledger=replace(ledger, counts=counts, pairs=pairs, spans=spans))
 
@@ -216,6 +224,15 @@ def aircraft_of(spans: Sequence[Span], key: Key, at: int) -> str | None:
         if span.key == key and span.since <= at and (span.until is None or at < span.until):
             return span.aircraft
     return None
+
+
+def ordinal_of(spans: Sequence[Span], key: Key, at: int) -> int:
+    """How many times a radar track had become an aircraft by an instant: 0 before the first."""
+    return max((span.index for span in spans if span.key == key and span.since <= at), default=0)
+
+
+def _latest_index(spans: Sequence[Span], key: Key) -> int:
+    return max((span.index for span in spans if span.key == key), default=0)
 
 
 def _compare(fix: Fix, tracks: RadarTracks, ledger: Ledger, setting: Setting) -> tuple[tuple[Comparison, ...], frozenset[Key]]:
@@ -332,7 +349,8 @@ def _count(
     if changes:
         gone = tuple(replace(s, until=fix.at) if s.until is None and pairs.get(s.key) != s.aircraft else s for s in spans)
         now = {span.key for span in gone if span.until is None}
-        spans = (*gone, *(Span(key, owner, fix.at) for key, owner in pairs.items() if key not in now))
+        begun = [(key, owner) for key, owner in pairs.items() if key not in now]
+        spans = (*gone, *(Span(key, owner, fix.at, None, _latest_index(gone, key) + 1) for key, owner in begun))
     return Ledger(counts, pairs, spans, {**ledger.checked_at, aircraft: fix.at}), tuple(changes)
 
 

@@ -112,7 +112,7 @@ def polar_from_xyz(radar_m: ArrayLike) -> Floats:
     Source: 003 2.2 eq 5, with atan2.
     """
     given = np.asarray(radar_m, dtype=np.float64)
-    x, y, z = (np.ascontiguousarray(given[..., axis]) for axis in range(3))
+    x, y, z = (given[..., axis].copy() for axis in range(3))
     level = x * x + y * y
     return np.stack([np.sqrt(level + z * z), np.arctan2(y, x), np.arctan2(z, np.sqrt(level))], axis=-1)
 
@@ -120,7 +120,7 @@ def polar_from_xyz(radar_m: ArrayLike) -> Floats:
 def xyz_from_polar(polar: ArrayLike) -> Floats:
     """Radar-frame positions (..., 3) of range m, azimuth rad, elevation rad (..., 3)."""
     given = np.asarray(polar, dtype=np.float64)
-    distance, azimuth, elevation = (np.ascontiguousarray(given[..., axis]) for axis in range(3))
+    distance, azimuth, elevation = (given[..., axis].copy() for axis in range(3))
     level = distance * np.cos(elevation)
     return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), distance * np.sin(elevation)], axis=-1)
 

@@ -48,7 +48,7 @@ def ecef_to_geodetic(ecef_m: ArrayLike) -> tuple[Floats, Floats, Floats]:
     Source: 004 eq 8. Deviation: its printed height form is singular at the equator (the numerator of its latitude lacks e'^2).
     """
     ecef = np.asarray(ecef_m, dtype=np.float64)
-    x, y, z = (np.ascontiguousarray(ecef[..., axis]) for axis in range(3))
+    x, y, z = (ecef[..., axis].copy() for axis in range(3))
     from_axis = np.sqrt(x * x + y * y)
     reduced = np.arctan2(z, (1.0 - FLATTENING) * from_axis)
     for _ in range(3):

@@ -1,11 +1,22 @@
-"""Predict: where it will be, and how sure that is. For now at constant velocity."""
+"""Predict: where it will be, and how sure that is. For now at constant velocity.
+
+Predictions are made at whole multiples of their period, for every track at once.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gateway.align import SECOND
+from gateway.estimators.kalman import POSITION, Estimate, predict
+from gateway.frames import RunwayFrame, turn
+from gateway.fuse import Lane
+from gateway.fuse.weighting import Model
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -28,3 +39,56 @@ class Predicted:
     intent_kind: tuple[str | None, ...]  # "declared", "inferred"
     confidence: Floats  # NaN where there is no intent
     runway_m: Floats  # (n, 3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Forecast:
+    """One instant's predictions of all tracks, before they are brought into the world's coordinates: t tracks, h horizons."""
+
+    made: int
+    tracks: tuple[int, ...]
+    horizons_s: tuple[float, ...]
+    mean: Floats  # (t, h, 3) ENU
+    sigma_m: Floats  # (t, h)
+
+
+def forecast(lanes: Sequence[Lane], at: int, horizons_s: tuple[float, ...], model: Model) -> Forecast:
+    """Every track carried on from an instant to each horizon."""
+    n, h = len(lanes), len(horizons_s)
+    state = Estimate(
+        np.repeat(np.array([lane.last.mean for lane in lanes]).reshape(n, -1), h, axis=0),
+        np.repeat(np.array([lane.last.covariance for lane in lanes]).reshape(n, 9, 9), h, axis=0),
+    )
+    since_s = np.array([max(at - lane.last.at, 0) / SECOND for lane in lanes])
+    ahead = predict(state, (since_s[:, None] + np.array(horizons_s)).reshape(-1), model.motion)
+    variance = 0.5 * (ahead.covariance[:, 0, 0] + ahead.covariance[:, 1, 1])
+    tracks = tuple(lane.track for lane in lanes)
+    mean = ahead.mean[:, POSITION].reshape(n, h, 3)
+    return Forecast(at, tracks, horizons_s, mean, np.sqrt(variance).reshape(n, h))
+
+
+def table(forecasts: Sequence[Forecast], frame: RunwayFrame) -> Predicted:
+    """Forecasts as columns in geodetic coordinates."""
+    made = [np.full(f.sigma_m.size, f.made, dtype=np.int64) for f in forecasts]
+    track = [np.repeat(np.array(f.tracks, dtype=np.int64), len(f.horizons_s)) for f in forecasts]
+    horizon = [np.tile(np.array(f.horizons_s), len(f.tracks)) for f in forecasts]
+    position = np.concatenate([np.zeros((0, 3)), *(f.mean.reshape(-1, 3) for f in forecasts)])
+    latitude, longitude, height = frame.geodetic_from_enu(position)
+    made_at = np.concatenate([np.zeros(0, dtype=np.int64), *made])
+    horizon_s = np.concatenate([np.zeros(0), *horizon])
+    n = len(made_at)
+    return Predicted(
+        made=made_at,
+        track=np.concatenate([np.zeros(0, dtype=np.int64), *track]),
+        valid=made_at + (horizon_s * SECOND).astype(np.int64),
+        horizon_s=horizon_s,
+        latitude_rad=latitude,
+        longitude_rad=longitude,
+        height_m=height,
+        sigma_m=np.concatenate([np.zeros(0), *(f.sigma_m.reshape(-1) for f in forecasts)]),
+        method=("model",) * n,
+        intent=(None,) * n,
+        intent_kind=(None,) * n,
+        confidence=np.full(n, math.nan),
+        runway_m=turn(frame.runway_from_enu, position),
+    )

@@ -60,6 +60,11 @@ class RadarTracks:
         return replace(self, plots={key: plots for key, plots in kept.items() if plots})
 
 
+def table(tracks: RadarTracks, untracked: int) -> Tracked:
+    """The radar tracks alive, by name."""
+    return Tracked(tuple(sorted({name_of(key) for key in tracks.plots})), untracked)
+
+
 def name_of(key: Key) -> str:
     """How people write a radar track: "1/3" is radar 1, track 3."""
     return f"{key[0]}/{key[1]}"

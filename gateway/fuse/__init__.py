@@ -4,7 +4,38 @@
 many tracks at once; `weighting` holds the four ways to weigh a position source against a radar; `rows` makes the result.
 """
 
-from gateway.fuse.lanes import Lane, Lanes
-from gateway.fuse.rows import Ended, Fused
+from gateway.fuse.lanes import (
+    Ended,
+    Lane,
+    Lanes,
+    Scene,
+    contains,
+    emptied,
+    end_silent,
+    joined,
+    lane_of,
+    reroute,
+    take_fix,
+    take_plot,
+)
+from gateway.fuse.rows import Fused, Row, coast, table, work
 
-__all__ = ["Ended", "Fused", "Lane", "Lanes"]
+__all__ = [
+    "Ended",
+    "Fused",
+    "Lane",
+    "Lanes",
+    "Row",
+    "Scene",
+    "coast",
+    "contains",
+    "emptied",
+    "end_silent",
+    "joined",
+    "lane_of",
+    "reroute",
+    "table",
+    "take_fix",
+    "take_plot",
+    "work",
+]

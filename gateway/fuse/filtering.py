@@ -54,6 +54,7 @@ class Job:
     base: Event | None
     measures: Sequence[Measure]
     neighbour: Neighbour
+    fresh: int = -1  # serial of the measurement that asked for it
 
 
 def rank(measure: Measure) -> tuple[int, int, str, int]:
@@ -106,9 +107,10 @@ def _advance(
 
 
 def _stacked(bases: Sequence[Event], model: Model) -> tuple[Floats, Floats, Floats]:
-    mean = np.array([base.mean for base in bases]).reshape(-1, 9)
-    covariance = np.array([base.covariance for base in bases]).reshape(-1, 9, 9)
-    memory = np.array([base.memory for base in bases]).reshape(-1, model.memory, 3)
+    n = len(bases)
+    mean = np.array([base.mean for base in bases]).reshape(n, 9)
+    covariance = np.array([base.covariance for base in bases]).reshape(n, 9, 9)
+    memory = np.array([base.memory for base in bases]).reshape(n, model.memory, 3)
     return mean, covariance, memory
 
 

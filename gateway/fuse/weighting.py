@@ -101,7 +101,7 @@ def update_with_fixes(
 
 
 def update_with_plots(
-    state: Estimate, polar: Floats, sigma: Floats, radar: int, frame: RadarFrame
+    state: Estimate, polar: Floats, sigma: Floats, frame: RadarFrame
 ) -> tuple[Estimate, Innovation]:
     """States after plots of one radar: polar and sigma (n, 3), NaN components are left out. Source: 003 2.4 eq 17 to 20."""
     xyz = frame.from_enu(state.mean[:, POSITION])

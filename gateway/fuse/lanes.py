@@ -1,0 +1,334 @@
+"""The system tracks and their recent past: where a measurement belongs in time, and what must be worked again after it.
+
+Each track keeps its measurements of the last `history_s` with the state after each. A late one goes back to its place and
+what came after it, in this track only, is worked again; a pair made or lost in hindsight moves its plots from one track to
+another and works both again from there. So the last row of a track for any time is that of in-order processing, at the
+cost of that track's own few measurements, not of everything that was heard since.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from gateway.align import SECOND, Fix, Plot, bracket
+from gateway.associate import Span, aircraft_of, ordinal_of
+from gateway.fuse.filtering import Event, Job, Measure, Neighbour, rank
+from gateway.settings import Options
+from gateway.track import Key, RadarTracks, name_of
+
+LEAST_PLOTS = 3  # before a radar track that nobody claims becomes a system track
+COMPLETED_WITHIN_S = 1.6  # components of neighbouring plots this close may complete the first one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lane:
+    """One system track: an aircraft's, or a radar track's that is no aircraft (`key` and which of its free times)."""
+
+    track: int
+    aircraft: str | None
+    key: Key | None
+    ordinal: int
+    events: tuple[Event, ...] = ()
+    whole: bool = True  # nothing of its past was forgotten yet
+    ended_at: int | None = None
+
+    @property
+    def last(self) -> Event:
+        """The newest state; only of a lane with events."""
+        return self.events[-1]
+
+    def coasting_at(self, at: int, options: Options) -> bool:
+        """Whether it has been silent for longer than its own rhythm explains."""
+        silence = at - self.last.at
+        return silence > max(int(options.coast_after_s * SECOND), min(self.last.interval, 20 * SECOND) * 5 // 2)
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """A system track that is no more, and why."""
+
+    at: int
+    track: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Lanes:
+    """All system tracks; track numbers count from 1 and are never used again."""
+
+    lanes: Mapping[int, Lane] = field(default_factory=dict)
+    by_aircraft: Mapping[str, int] = field(default_factory=dict)
+    by_key: Mapping[tuple[Key, int], int] = field(default_factory=dict)
+    next_track: int = 1
+
+    def with_lane(self, lane: Lane) -> Lanes:
+        """The same with one lane put in place of its former self."""
+        return replace(self, lanes={**self.lanes, lane.track: lane})
+
+    def begun(self, aircraft: str | None, key: Key | None, ordinal: int) -> tuple[Lanes, Lane]:
+        """The same with a new lane of the next number."""
+        lane = Lane(self.next_track, aircraft, key, ordinal)
+        by_aircraft = {**self.by_aircraft, aircraft: lane.track} if aircraft is not None else self.by_aircraft
+        by_key = {**self.by_key, (key, ordinal): lane.track} if key is not None else self.by_key
+        return Lanes({**self.lanes, lane.track: lane}, by_aircraft, by_key, self.next_track + 1), lane
+
+    def without(self, tracks: Iterable[int]) -> Lanes:
+        """The same without some tracks."""
+        gone = set(tracks)
+        return Lanes(
+            {track: lane for track, lane in self.lanes.items() if track not in gone},
+            {aircraft: track for aircraft, track in self.by_aircraft.items() if track not in gone},
+            {key: track for key, track in self.by_key.items() if track not in gone},
+            self.next_track,
+        )
+
+    def pruned(self, before: int) -> Lanes:
+        """The same with only the last state before an instant, and what came after it, in each lane."""
+        changed = {}
+        for track, lane in self.lanes.items():
+            if len(lane.events) > 1 and lane.events[1].at < before:
+                keep = max(bisect_left(lane.events, before, key=lambda event: event.at) - 1, 0)
+                changed[track] = replace(lane, events=lane.events[keep:], whole=False)
+        return replace(self, lanes={**self.lanes, **changed}) if changed else self
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What lanes are built from: the radar tracks, which aircraft they are when, and the options."""
+
+    tracks: RadarTracks
+    spans: tuple[Span, ...]
+    options: Options
+
+    def neighbour(self, lane: Lane) -> Neighbour:
+        """The plot of this lane's radar track at a report's time, for the literal weighting."""
+
+        def at_time_of(fix: Fix) -> tuple[int, np.ndarray, np.ndarray] | None:  # type: ignore[type-arg]
+            for span in self.spans:
+                if span.aircraft != lane.aircraft or aircraft_of(self.spans, span.key, fix.at) != lane.aircraft:
+                    continue
+                plots = self.tracks.plots.get(span.key, ())
+                value, sigma = bracket(plots, fix.at, self.options.association_wait_s)
+                if not np.isnan(value).all():
+                    return span.key[0], value, sigma
+            return None
+
+        return at_time_of
+
+
+def take_fix(lanes: Lanes, fix: Fix, scene: Scene) -> tuple[Lanes, Job | None]:
+    """The lanes with a GPS report in its aircraft's, and what is to be worked; no job means that it came too late."""
+    track = lanes.by_aircraft.get(fix.aircraft)
+    if track is None:
+        lanes, lane = lanes.begun(fix.aircraft, None, 0)
+    else:
+        lane = lanes.lanes[track]
+    return _inserted(lanes, lane, fix, scene)
+
+
+def take_plot(lanes: Lanes, plot: Plot, key: Key, scene: Scene) -> tuple[Lanes, Job | None]:
+    """The lanes with a plot in the track that it belongs to; no job means too late, or that nothing can start yet."""
+    aircraft = aircraft_of(scene.spans, key, plot.at)
+    if aircraft is not None:
+        track = lanes.by_aircraft.get(aircraft)
+        return _inserted(lanes, lanes.lanes[track], plot, scene) if track is not None else (lanes, None)
+    ordinal = ordinal_of(scene.spans, key, plot.at)
+    track = lanes.by_key.get((key, ordinal))
+    if track is None:
+        return _begun_from_plots(lanes, key, ordinal, scene)
+    lane = lanes.lanes[track]
+    if lane.whole and (not lane.events or rank(plot) < rank(lane.events[0].measure)):
+        return _rebuilt(lanes, lane, 0, scene)
+    return _inserted(lanes, lane, plot, scene)
+
+
+def lane_of(lanes: Lanes, plot: Plot, key: Key, scene: Scene) -> int | None:
+    """The track that a plot belongs to, or None where none has begun."""
+    aircraft = aircraft_of(scene.spans, key, plot.at)
+    if aircraft is not None:
+        return lanes.by_aircraft.get(aircraft)
+    return lanes.by_key.get((key, ordinal_of(scene.spans, key, plot.at)))
+
+
+def contains(lanes: Lanes, plot: Plot) -> bool:
+    """Whether some track has worked in a plot already."""
+    return any(event.measure is plot for lane in lanes.lanes.values() for event in reversed(lane.events))
+
+
+def end_silent(lanes: Lanes, at: int, options: Options) -> tuple[Lanes, list[Ended]]:
+    """The lanes without those that have been silent for too long, and without those that joined another long ago."""
+    limit, history = int(options.end_after_s * SECOND), int(options.history_s * SECOND)
+    ended, gone = [], []
+    for lane in lanes.lanes.values():
+        if lane.ended_at is not None:
+            if lane.ended_at < at - history:
+                gone.append(lane.track)
+        elif not lane.events or at - lane.last.at > limit:
+            gone.append(lane.track)
+            ended.append(Ended(at, lane.track, f"no data for {options.end_after_s:.0f} s"))
+    return (lanes.without(gone), ended) if gone else (lanes, ended)
+
+
+def joined(lanes: Lanes, spans: Sequence[Span]) -> tuple[Lanes, list[Ended]]:
+    """The lanes with those radar tracks ended that became an aircraft, and those going on that in hindsight did not."""
+    ended = []
+    for lane in list(lanes.lanes.values()):
+        if lane.key is None:
+            continue
+        to = joined_at(lane, spans)
+        if to is not None and lane.ended_at is None:
+            ended.append(Ended(to[0], lane.track, f"joined track {lanes.by_aircraft.get(to[1], 0)}, {to[1]}"))
+        if (to[0] if to else None) != lane.ended_at:
+            lanes = lanes.with_lane(replace(lane, ended_at=to[0] if to else None))
+    return lanes, ended
+
+
+def emptied(lanes: Lanes) -> Lanes:
+    """The aircraft's lanes without their past; radar tracks' lanes are gone."""
+    kept = {track: replace(lane, events=(), whole=True) for track, lane in lanes.lanes.items() if lane.key is None}
+    return replace(lanes, lanes=kept, by_key={})
+
+
+def reroute(lanes: Lanes, old: tuple[Span, ...], scene: Scene) -> tuple[Lanes, list[Job]]:
+    """The lanes after pairs were made, lost or moved in time; and what of them is to be worked again."""
+    from_when: dict[str, int] = {}
+    keys: dict[Key, int] = {}
+    for key in sorted({span.key for span in {*old} ^ {*scene.spans}}):
+        for at in sorted({t for s in (*old, *scene.spans) if s.key == key for t in (s.since, s.until) if t is not None}):
+            before, now = aircraft_of(old, key, at), aircraft_of(scene.spans, key, at)
+            if before == now:
+                continue
+            keys.setdefault(key, at)
+            for aircraft in (before, now):
+                if aircraft is not None:
+                    from_when[aircraft] = min(at, from_when.get(aircraft, at))
+    jobs = []
+    for aircraft, at in sorted(from_when.items()):
+        track = lanes.by_aircraft.get(aircraft)
+        if track is not None:
+            lanes, job = _rebuilt(lanes, lanes.lanes[track], at, scene)
+            jobs.append(job)
+    for key, at in keys.items():
+        for (known, _), track in list(lanes.by_key.items()):
+            if known == key:
+                lanes, job = _rebuilt(lanes, lanes.lanes[track], at, scene)
+                jobs.append(job)
+        ordinal = ordinal_of(scene.spans, key, scene.tracks.plots[key][-1].at) if key in scene.tracks.plots else 0
+        free = key in scene.tracks.plots and aircraft_of(scene.spans, key, scene.tracks.plots[key][-1].at) is None
+        if free and (key, ordinal) not in lanes.by_key:
+            lanes, begun = _begun_from_plots(lanes, key, ordinal, scene)
+            jobs.append(begun)
+    return lanes, [job for job in jobs if job is not None]
+
+
+def joined_at(lane: Lane, spans: Sequence[Span]) -> tuple[int, str] | None:
+    """When and to which aircraft a radar track's lane went over, or None while it stands alone."""
+    following = [s for s in spans if s.key == lane.key and s.index == lane.ordinal + 1]
+    return (following[0].since, following[0].aircraft) if following else None
+
+
+def _inserted(lanes: Lanes, lane: Lane, measure: Measure, scene: Scene) -> tuple[Lanes, Job | None]:
+    """The measurement in its place, and the job of working it and what came after."""
+    order = rank(measure)
+    events = lane.events
+    place = len(events)
+    while place and rank(events[place - 1].measure) > order:
+        place -= 1
+    if place == 0 and events and (not lane.whole or isinstance(measure, Plot)):
+        return lanes, None
+    following: list[Measure] = [measure, *(event.measure for event in events[place:])]
+    if scene.options.weighting == "literal" and isinstance(measure, Plot):
+        # A report shortly before this plot was fused with an interpolation that this plot changes.
+        first = measure.at - int(scene.options.association_wait_s * SECOND)
+        touched = next((i for i in range(1, place) if events[i].at >= first and isinstance(events[i].measure, Fix)), place)
+        following = [*(event.measure for event in events[touched:place]), *following]
+        place = touched
+    job = Job(lane.track, events[place - 1] if place else None, following, scene.neighbour(lane), measure.serial)
+    return lanes.with_lane(replace(lane, events=events[:place])), job
+
+
+def _rebuilt(lanes: Lanes, lane: Lane, at: int, scene: Scene) -> tuple[Lanes, Job | None]:
+    """The lane with everything from an instant on taken out, and the job of putting in what belongs there now."""
+    keep = bisect_left(lane.events, at, key=lambda event: event.at)
+    if keep == 0 and not lane.whole:
+        keep = 1
+    if lane.aircraft is not None:
+        floor = lane.events[keep - 1].at if keep else at
+        measures: list[Measure] = [e.measure for e in lane.events[keep:] if isinstance(e.measure, Fix)]
+        measures += [plot for plot in _plots_of(lane.aircraft, scene) if plot.at >= max(at, floor)]
+    else:
+        if lane.whole:
+            keep = 0
+        plots = _free_plots(lane, scene)
+        measures = [*_begin(plots)] if not keep else [p for p in plots if p.at >= at]
+    lane = replace(lane, events=lane.events[:keep])
+    lanes = lanes.with_lane(lane)
+    base = lane.events[-1] if keep else None
+    if base is not None:
+        measures = [measure for measure in measures if rank(measure) > rank(base.measure)]
+    measures.sort(key=rank)
+    return lanes, Job(lane.track, base, measures, scene.neighbour(lane)) if measures else None
+
+
+def _begun_from_plots(lanes: Lanes, key: Key, ordinal: int, scene: Scene) -> tuple[Lanes, Job | None]:
+    """A new lane for a radar track that nobody claims, once its plots allow to start one."""
+    measures = _begin(_free_plots(Lane(0, None, key, ordinal), scene))
+    if not measures:
+        return lanes, None
+    lanes, lane = lanes.begun(None, key, ordinal)
+    return lanes, Job(lane.track, None, measures, scene.neighbour(lane))
+
+
+def _plots_of(aircraft: str, scene: Scene) -> list[Plot]:
+    """All remembered plots of the radar tracks that are this aircraft, at the times when they are."""
+    found = []
+    for span in scene.spans:
+        if span.aircraft == aircraft:
+            plots = scene.tracks.plots.get(span.key, ())
+            found += [plot for plot in plots if plot.at >= span.since and (span.until is None or plot.at < span.until)]
+    return found
+
+
+def _free_plots(lane: Lane, scene: Scene) -> list[Plot]:
+    """The plots of a lane's radar track in the free time that is this lane's."""
+    key = lane.key
+    if key is None:
+        return []
+    spans = [span for span in scene.spans if span.key == key]
+    return [
+        plot
+        for plot in scene.tracks.plots.get(key, ())
+        if ordinal_of(spans, key, plot.at) == lane.ordinal and aircraft_of(spans, key, plot.at) is None
+    ]
+
+
+def _begin(plots: Sequence[Plot]) -> list[Measure]:
+    """The measurements of a radar track from the first one that can start a state: complete, or completed by neighbours."""
+    for place in range(LEAST_PLOTS - 1, len(plots)):
+        plot = plots[place]
+        polar, sigma = plot.polar.copy(), plot.sigma.copy()
+        for component in range(3):
+            if not math.isnan(polar[component]):
+                continue
+            for other in reversed(plots[:place]):
+                if not math.isnan(other.polar[component]) and plot.at - other.at <= COMPLETED_WITHIN_S * SECOND:
+                    polar[component] = other.polar[component]
+                    moved_m = 150.0 * (plot.at - other.at) / SECOND
+                    sigma[component] += moved_m if component == 0 else moved_m / max(float(polar[0]), 300.0)
+                    break
+        if not np.isnan(polar).any():
+            return [replace(plot, polar=polar, sigma=sigma, begins=True), *plots[place + 1 :]]
+    return []
+
+
+def radar_names(lane: Lane, spans: Sequence[Span], at: int) -> str | None:
+    """The radar tracks behind a lane at an instant, as people write them."""
+    if lane.key is not None:
+        return name_of(lane.key)
+    names = [name_of(s.key) for s in spans if s.aircraft == lane.aircraft and s.since <= at and (s.until is None or at < s.until)]
+    return " ".join(sorted(set(names))) or None

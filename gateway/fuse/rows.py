@@ -1,0 +1,150 @@
+"""The rows that the fused tracks write, as columns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.align import SECOND, Fix
+from gateway.associate import Span
+from gateway.estimators.kalman import ERROR, POSITION, SIZE, VELOCITY, Estimate, predict
+from gateway.frames import RunwayFrame, turn
+from gateway.fuse.filtering import Event, Job, run
+from gateway.fuse.lanes import Ended, Lane, Lanes, radar_names
+from gateway.fuse.weighting import Model
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+SEEN_WITHIN_S = 10.0  # a source that saw the track this lately is part of its state
+
+
+@dataclass(frozen=True, slots=True)
+class Fused:
+    """A step's track updates, n rows in writing order; a row for a (track, time) already written corrects it."""
+
+    time: Ints  # (n,) ns, when the state holds
+    received: Ints  # (n,) ns, when the observation behind it was heard; -1 = none
+    track: Ints  # (n,)
+    aircraft: tuple[str | None, ...]
+    radar_track: tuple[str | None, ...]  # "1/3", several with a space between
+    updated_by: tuple[str, ...]  # "gps", "radar", "coast"
+    state: tuple[str, ...]  # "gps only", "radar only", "fused", "coasting"
+    latitude_rad: Floats
+    longitude_rad: Floats
+    height_m: Floats  # above the ellipsoid
+    altitude_msl_m: Floats
+    velocity_mps: Floats  # (n, 3) east, north, up at that point
+    covariance: Floats  # (n, 36) row-major over east, north, up position and velocity at that point
+    modes: Floats  # (n, 3) straight, left, right; NaN = the estimator has none
+    runway_m: Floats  # (n, 3) position in the runway frame
+    bias_m: Floats  # (n, 3) estimated error of the position source, east north up; NaN = none
+    ended: tuple[Ended, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Row:
+    """One row before its numbers are brought into the world's coordinates."""
+
+    time: int
+    received: int
+    track: int
+    aircraft: str | None
+    radar_track: str | None
+    updated_by: str
+    state: str
+    mean: Floats  # (9,)
+    covariance: Floats  # (9, 9)
+    separation_m: float  # of the geoid, as it was known then
+
+
+def row_of(lane: Lane, event: Event, spans: Sequence[Span], separation_m: float) -> Row:
+    """The row that an event of a lane writes."""
+    by = "gps" if isinstance(event.measure, Fix) else "radar"
+    within = int(SEEN_WITHIN_S * SECOND)
+    gps, radar = event.at - event.gps_at <= within, event.at - event.radar_at <= within
+    state = "fused" if gps and radar else "gps only" if gps else "radar only"
+    names = radar_names(lane, spans, event.at)
+    received = event.measure.received_at
+    return Row(
+        event.at, received, lane.track, lane.aircraft, names, by, state, event.mean, event.covariance, separation_m
+    )
+
+
+def work(
+    lanes: Lanes, jobs: Sequence[Job], spans: Sequence[Span], separation_m: float, model: Model
+) -> tuple[Lanes, list[Row], int]:
+    """The lanes with some jobs done, the rows that they wrote, and how many new measurements lay outside."""
+    rows: list[Row] = []
+    changed: dict[int, Lane] = {}
+    outliers = 0
+    for job, events in zip(jobs, run(jobs, model), strict=True):
+        lane = lanes.lanes[job.track]
+        changed[lane.track] = replace(lane, events=(*lane.events, *events))
+        rows += [row_of(lane, event, spans, separation_m) for event in events]
+        outliers += sum(event.outlying and event.measure.serial == job.fresh for event in events)
+    return replace(lanes, lanes={**lanes.lanes, **changed}), rows, outliers
+
+
+def coast(lanes: Sequence[Lane], at: int, spans: Sequence[Span], separation_m: float, model: Model) -> list[Row]:
+    """A row for each of some silent lanes, carried on to an instant."""
+    if not lanes:
+        return []
+    mean = np.array([lane.last.mean for lane in lanes])
+    covariance = np.array([lane.last.covariance for lane in lanes])
+    elapsed_s = np.array([(at - lane.last.at) / SECOND for lane in lanes])
+    state = predict(Estimate(mean, covariance), elapsed_s, model.motion)
+    return [
+        Row(
+            at,
+            -1,
+            lane.track,
+            lane.aircraft,
+            radar_names(lane, spans, at),
+            "coast",
+            "coasting",
+            state.mean[i],
+            state.covariance[i],
+            separation_m,
+        )
+        for i, lane in enumerate(lanes)
+    ]
+
+
+def table(rows: Sequence[Row], ended: Sequence[Ended], frame: RunwayFrame, model: Model) -> Fused:
+    """Rows as columns, in geodetic coordinates and with velocity and covariance along the axes at each point."""
+    n = len(rows)
+    mean = np.array([row.mean for row in rows]).reshape(n, SIZE)
+    full = np.array([row.covariance for row in rows]).reshape(n, SIZE, SIZE)
+    position = np.ascontiguousarray(mean[:, POSITION])
+    latitude, longitude, height = frame.geodetic_from_enu(position)
+    local = frame.local_from_enu(latitude, longitude)
+    both = np.zeros((n, 6, 6))
+    both[:, :3, :3] = both[:, 3:, 3:] = local
+    covariance = both @ np.ascontiguousarray(full[:, :6, :6]) @ both.transpose(0, 2, 1)
+    velocity = (local @ mean[:, VELOCITY][:, :, None])[:, :, 0]
+    known = np.array([row.aircraft is not None for row in rows], dtype=np.bool_)[:, None]
+    has_error = model.motion.error_sigma_m > 0.0
+    return Fused(
+        time=np.array([row.time for row in rows], dtype=np.int64),
+        received=np.array([row.received for row in rows], dtype=np.int64),
+        track=np.array([row.track for row in rows], dtype=np.int64),
+        aircraft=tuple(row.aircraft for row in rows),
+        radar_track=tuple(row.radar_track for row in rows),
+        updated_by=tuple(row.updated_by for row in rows),
+        state=tuple(row.state for row in rows),
+        latitude_rad=latitude,
+        longitude_rad=longitude,
+        height_m=height,
+        altitude_msl_m=height - np.array([row.separation_m for row in rows]).reshape(n),
+        velocity_mps=velocity,
+        covariance=covariance.reshape(n, 36),
+        modes=np.full((n, 3), math.nan),
+        runway_m=turn(frame.runway_from_enu, position),
+        bias_m=np.where(known & has_error, mean[:, ERROR], math.nan),
+        ended=tuple(ended),
+    )
