@@ -187,7 +187,8 @@ def _positions(scene: Scene, aircraft: Aircraft) -> list[_Sayings]:
         boot_ms = _boot_ms(scene, aircraft, float(measured.valid_s[which]))
         return _global_position(scene, measured, which, boot_ms, float(yaw[which]))
 
-    return [raw, _Sayings("GLOBAL_POSITION_INT", arrives, fields)]
+    # in this order a receiver knows, when the raw fix comes, that it already has the autopilot's own estimate
+    return [_Sayings("GLOBAL_POSITION_INT", arrives, fields), raw]
 
 
 def _place(scene: Scene, measured: GpsMeasured, index: int) -> Fields:
