@@ -26,6 +26,7 @@ class _Listened:
 
     source: Source
     counters: Counter[str] = field(default_factory=Counter)
+    known_good: set[int] = field(default_factory=set)  # message ids that have passed their checksum
     last_heard: int | None = None
     lately: deque[list[int]] = field(default_factory=lambda: deque(maxlen=_RATE_S + 1))  # [second, observations]
 
@@ -131,9 +132,12 @@ class Decoder:
             listened.counters["not a frame"] += 1
             return ()
         listened.counters["frames"] += 1
-        if frame.verdict != "good":
+        if frame.verdict == "good":
+            listened.known_good.add(frame.message)
+        elif frame.verdict == "bad checksum":  # always for one id, while framing goes on: not damage
+            listened.counters["crc error" if frame.message in listened.known_good else "definition differs"] += 1
+        else:
             listened.counters[frame.verdict] += 1
-            return ()
         if frame.signed:
             listened.counters["signed, unchecked"] += 1
         return self._mavlink.hear(arrival.source, frame, arrival.received_at, listened.counters)

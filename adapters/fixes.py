@@ -1,7 +1,7 @@
 """GLOBAL_POSITION_INT and GPS_RAW_INT, paired: is there a fix, how good is it, and is this a position at all?
 
-GLOBAL_POSITION_INT is the autopilot's estimate: it carries no accuracy, is near (0, 0) before the estimator has an origin,
-and goes on by dead reckoning when GPS is lost without saying so. GPS_RAW_INT tells the rest: fix type, accuracies, and
+GLOBAL_POSITION_INT is the autopilot's estimate: it carries no accuracy, is near (0, 0) before the estimator has an origin
+(its altitude stays near 0 until home is set), and goes on by dead reckoning when GPS is lost without saying so. GPS_RAW_INT tells the rest: fix type, accuracies, and
 the height above the ellipsoid; while GPS is lost its positions may go on moving with a frozen time.
 """
 
@@ -15,7 +15,7 @@ from adapters.mavlink_frames import fields
 from gateway.observation import GpsReport, Timing
 
 GLOBAL_POSITION_INT, read_position = fields(
-    "GLOBAL_POSITION_INT", "time_boot_ms", "lat", "lon", "alt", "vx", "vy", "vz", "hdg"
+    "GLOBAL_POSITION_INT", "time_boot_ms", "lat", "lon", "alt", "relative_alt", "vx", "vy", "vz", "hdg"
 )
 GPS_RAW_INT, read_fix = fields(
     "GPS_RAW_INT", "time_usec", "lat", "lon", "alt", "fix_type", "alt_ellipsoid", "h_acc", "v_acc", "vel_acc", "vel", "cog"
@@ -26,6 +26,8 @@ _STALE_NS = 5 * SECOND
 _NEAR_ZERO = 10**7  # 1 degree about (0, 0)
 _LARGEST_SEPARATION_MM = 150_000
 _LOWEST_MM, _HIGHEST_MM = -10_000_000, 100_000_000
+_NO_ORIGIN_MM = 100_000  # estimate and receiver further apart in altitude: the estimator has no origin yet
+_NO_HOME_MM = 15_000  # and also when nearer, where the altitude above home is the altitude itself
 _DEGE7 = math.pi / 180.0 / 1e7
 
 
@@ -39,6 +41,8 @@ class Fixes:
     last_position: int | None = None
     _fix_type: int | None = None
     _place: tuple[int, int] = (0, 0)
+    _altitude_mm: int = 0
+    _has_origin: bool = False
     _usec: int = 0
     _heard: int = 0
     _moved: int = 0
@@ -55,6 +59,7 @@ class Fixes:
         if fresh or usec == 0 or at < self._moved:
             self._usec, self._moved = usec, at
         self._fix_type, self._place, self._heard = fix_type, (latitude, longitude), at
+        self._altitude_mm = altitude
         self._accuracies_mm = (accuracies[0], accuracies[1], accuracies[2])
         separation = ellipsoid - altitude
         if fix_type >= 3 and ellipsoid != 0 and separation != 0 and abs(separation) <= _LARGEST_SEPARATION_MM:
@@ -68,11 +73,13 @@ class Fixes:
             return True
         return self._fix_type >= 3 and self._heard - self._moved <= _FROZEN_NS
 
-    def report(self, payload: bytes, aircraft: str, when: tuple[int, Timing], received_at: int, at: int) -> GpsReport | None:
+    def report(
+        self, payload: bytes, aircraft: str, when: tuple[int, Timing], received_at: int, at: int
+    ) -> GpsReport | None:
         """A GLOBAL_POSITION_INT as a report, or None (and a reason counted) where it is none."""
-        boot_ms, latitude, longitude, altitude, north, east, down, heading = read_position(payload)
+        boot_ms, latitude, longitude, altitude, above_home, north, east, down, heading = read_position(payload)
         self.last_position = at
-        reason = self._refusal(boot_ms, latitude, longitude)
+        reason = self._refusal(boot_ms, (latitude, longitude), (altitude, above_home))
         if reason:
             if reason != "repeated":
                 self.reason = reason
@@ -104,7 +111,9 @@ class Fixes:
             when[1],
         )
 
-    def raw_report(self, payload: bytes, aircraft: str, when: tuple[int, Timing], received_at: int, at: int) -> GpsReport | None:
+    def raw_report(
+        self, payload: bytes, aircraft: str, when: tuple[int, Timing], received_at: int, at: int
+    ) -> GpsReport | None:
         """A GPS_RAW_INT as a report, for vehicles that send no GLOBAL_POSITION_INT; its altitude is the receiver's."""
         _, latitude, longitude, altitude, _, _, _, _, _, speed, course = read_fix(payload)
         if not self.has_fix() or not _is_place(latitude, longitude) or latitude == longitude == 0:
@@ -131,8 +140,15 @@ class Fixes:
             timing=when[1],
         )
 
-    def _refusal(self, boot_ms: int, latitude: int, longitude: int) -> str:
+    def reboot(self) -> None:
+        """The vehicle has started anew: its estimator has no origin, its times repeat."""
+        self._has_origin, self._last_boot_ms = False, -1
+        self.last_position = self._fix_type = None
+        self._recent.clear()
+
+    def _refusal(self, boot_ms: int, place: tuple[int, int], altitudes_mm: tuple[int, int]) -> str:
         """Why this is no position; empty when it is one."""
+        (latitude, longitude), (altitude, above_home) = place, altitudes_mm
         if boot_ms == self._last_boot_ms or (boot_ms < self._last_boot_ms and boot_ms in self._recent):
             return "repeated"
         self._last_boot_ms = boot_ms
@@ -145,7 +161,11 @@ class Fixes:
             there = (self._fix_type or 0) >= 3 and max(abs(self._place[0]), abs(self._place[1])) < _NEAR_ZERO
             if not there or latitude == longitude == 0:
                 return "no position yet"
-        return ""
+        if not self._has_origin and self._fix_type is not None:
+            apart = abs(altitude - self._altitude_mm)
+            limit = _NO_HOME_MM if abs(altitude - above_home) < 100 else _NO_ORIGIN_MM
+            self._has_origin = apart <= limit
+        return "" if self._has_origin or self._fix_type is None else "no altitude yet"
 
     def _height(self, altitude_mm: int) -> float | None:
         """Above the ellipsoid, where the receiver gives a height of its own and does not merely repeat the altitude."""

@@ -38,7 +38,7 @@ MISSION_ITEM_INT, _read_item_int = fields("MISSION_ITEM_INT", *_ITEM)
 
 _ARMED = 128
 _NO_POSITION_NS = 10 * SECOND
-_FIX_NOTES = 20  # a fix that comes and goes is told so often and no more
+_FIX_NOTES = 6  # a fix that comes and goes is told so often and no more
 _DEGE7 = math.pi / 180.0 / 1e7
 _BOOT_MS = {ATTITUDE: slice(0, 4), GLOBAL_POSITION_INT: slice(0, 4)}
 _MISSION = (MISSION_COUNT, MISSION_ITEM, MISSION_ITEM_INT)
@@ -70,13 +70,15 @@ class MavlinkObserver:
         }
 
     def hear(self, source: int, frame: Frame, received_at: int, counters: Counter[str]) -> Observations:
-        """One good frame of a source: what it observed; counts in the source's counters what is refused. Never raises."""
+        """One frame of a source: what it observed; counts in the source's counters what is refused. Never raises."""
         system, message = frame.system, frame.message
         if system == 0:
             counters["system 0"] += 1
             return ()
         component = self.registry.component(source, system, frame.component)
-        component.sequence.hear(frame.sequence, counters)
+        component.sequence.hear(frame.sequence, message, counters)
+        if frame.verdict != "good":
+            return ()
         if message in _MISSION:
             return self._mission(component, frame, received_at)
         reader = self._readers.get(message)
@@ -107,7 +109,8 @@ class MavlinkObserver:
         if vehicle.first_heartbeat is None or vehicle.first_heartbeat > now:
             vehicle.first_heartbeat = now
         if vehicle.fixes.last_report is None and not vehicle.has_position_warning:
-            if now - vehicle.first_heartbeat > _NO_POSITION_NS:
+            patience = _NO_POSITION_NS * (3 if vehicle.fixes.reason else 1)
+            if now - vehicle.first_heartbeat > patience:
                 vehicle.has_position_warning = True
                 self.notes.append(("warning", _no_position(vehicle)))
         valid_at, _ = self._at_receipt(heard)
@@ -256,6 +259,7 @@ class MavlinkObserver:
         if component.clock.reboots != component.reboots_told:
             component.reboots_told = component.clock.reboots
             heard.counters["reboots"] += 1
+            heard.vehicle.fixes.reboot()
             self.notes.append(("warning", f"{heard.vehicle.name} has rebooted: its clock begins anew."))
         return boot_ns
 
@@ -303,7 +307,7 @@ def _tells_apart(message: int, payload: bytes) -> bool:
 def _no_position(vehicle: Vehicle) -> str:
     name, reason = vehicle.name, vehicle.fixes.reason
     if reason:
-        return f"{name} sends heartbeats but no position that can be used for 10 s ({reason}): wait for its GPS fix."
+        return f"{name} sends heartbeats but no position that can be used ({reason}): wait for its GPS fix."
     return (
         f"{name} sends heartbeats but no position for 10 s: have it send GLOBAL_POSITION_INT "
         "(ArduPilot: SR0_POSITION = 5 for its link; PX4: mavlink stream -s GLOBAL_POSITION_INT -r 5)."

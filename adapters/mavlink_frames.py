@@ -47,7 +47,10 @@ _BYTE_OF_WORD = _crc_table()
 
 
 class Frame(NamedTuple):
-    """One frame taken apart. `verdict`: "good", "unknown id", "definition differs"; only "good" may be decoded."""
+    """One frame taken apart. Only one whose verdict is "good" may be decoded.
+
+    Other verdicts: "unknown id" and "definition differs" (some CRC extra fits, but not ours), "bad checksum" (none does).
+    """
 
     version: int
     system: int
@@ -66,7 +69,7 @@ def fits_some_extra(body: bytes, checksum: int) -> bool:
 
 
 def parse(frame: bytes) -> Frame | None:
-    """One whole frame taken apart; None where it is no frame, cut, of unknown flags, or damaged. Never raises."""
+    """One whole frame taken apart; None where it is no frame, cut, or has unknown flags. Never raises."""
     size = len(frame)
     if size < 8:
         return None
@@ -90,7 +93,7 @@ def parse(frame: bytes) -> Frame | None:
     elif fits_some_extra(body, checksum):
         verdict = "unknown id" if extra is None else "definition differs"
     else:
-        return None
+        verdict = "bad checksum"
     version = 2 if frame[0] == V2 else 1
     return Frame(version, system, component, sequence, message, frame[start:end], bool(signed), verdict)
 
@@ -183,36 +186,45 @@ class FrameScanner:
 
 @dataclass(slots=True)
 class SequenceCheck:
-    """The sequence numbers of one (link, system, component): counts "lost", "duplicate", "reordered", "unsequenced"."""
+    """The sequence numbers of one (link, system, component), modulo 256.
+
+    Counts "lost", "duplicate" (the same number and message again), "reordered", and "unsequenced" for a source whose
+    number never changes.
+    """
 
     last: int = -1
-    still: int = 0
+    message: int = -1
     recent: int = 0  # bit d: the number `last - d` was seen
     moved: bool = False
 
-    def hear(self, sequence: int, counters: Counter[str]) -> None:
+    def hear(self, sequence: int, message: int, counters: Counter[str]) -> None:
         """Take the next frame's number into account."""
         ahead = (sequence - self.last) & 255
-        if self.last < 0:
-            self.last, self.recent = sequence, 1
-        elif ahead == 1:
-            self.last, self.recent, self.moved = sequence, (self.recent << 1 | 1) & 0xFFFFFFFFFFFFFFFF, True
+        behind = 256 - ahead
+        if ahead == 1 and self.last >= 0:
+            self.recent = (self.recent << 1 | 1) & _RECENT
+            self.moved = True
+        elif self.last < 0:
+            self.recent = 1
         elif ahead == 0:
-            self._same(counters)
-        elif ahead >= 200 and (256 - ahead) < 64:
-            late = not self.recent >> (256 - ahead) & 1
-            counters["reordered" if late else "duplicate"] += 1
-            if late:
-                self.recent |= 1 << (256 - ahead)
+            if message == self.message or not self.moved:  # a radio's two status messages share their number
+                counters["duplicate" if self.moved else "unsequenced"] += 1
+        elif behind <= _REORDERED:
+            seen = self.recent >> behind & 1
+            counters["duplicate" if seen else "reordered"] += 1
+            if not seen:
+                self.recent |= 1 << behind
                 counters["lost"] -= 1
+            return
         else:
             counters["lost"] += ahead - 1
-            self.last, self.recent, self.moved = sequence, (self.recent << ahead | 1) & 0xFFFFFFFFFFFFFFFF, True
+            self.recent = (self.recent << ahead | 1) & _RECENT
+            self.moved = True
+        self.last, self.message = sequence, message
 
-    def _same(self, counters: Counter[str]) -> None:
-        """Again the same number: a duplicate, unless this source never counts at all."""
-        self.still += 1
-        counters["duplicate" if self.moved else "unsequenced"] += 1
+
+_REORDERED = 56  # numbers ahead by 200 and more are late ones
+_RECENT = (1 << (_REORDERED + 1)) - 1
 
 
 def fields(name: str, *wanted: str) -> tuple[int, Callable[[bytes], tuple[Any, ...]]]:
