@@ -1,4 +1,4 @@
-"""The console script: one file a command; a command reads, calls and draws, and imports what it needs when it is called."""
+"""The console script: one file a command; a command reads, calls and draws, and imports what it needs when called."""
 
 from __future__ import annotations
 

@@ -49,7 +49,9 @@ def run(arguments: list[str]) -> int:
     except _WRONG_USAGE as refusal:
         return _tell(_sentence(refusal), 2)
     except (KeyboardInterrupt, typer.Abort):
-        return _tell("Stopped at once; `talkdown sessions` on the archive's folder completes what was being written.", 1)
+        return _tell(
+            "Stopped at once; `talkdown sessions` on the archive's folder completes what was being written.", 1
+        )
     except BrokenPipeError:  # the reader of our output has seen enough
         sys.stderr.close()
         return 0

@@ -26,11 +26,21 @@ Examples:
 
 MavlinkOption = Annotated[
     list[str] | None,
-    typer.Option("--mavlink", metavar="URL", help="A MAVLink link; may be given several times. Port 14550 if none is said.", show_default=False),
+    typer.Option(
+        "--mavlink",
+        metavar="URL",
+        help="A MAVLink link; may be given several times. Port 14550 if none is said.",
+        show_default=False,
+    ),
 ]
 RadarOption = Annotated[
     list[str] | None,
-    typer.Option("--radar", metavar="URL", help="A landing-radar link; may be given several times. Port 30070 if none is said.", show_default=False),
+    typer.Option(
+        "--radar",
+        metavar="URL",
+        help="A landing-radar link; may be given several times. Port 30070 if none is said.",
+        show_default=False,
+    ),
 ]
 SecondsOption = Annotated[
     float | None, typer.Option("--seconds", metavar="S", min=0.0, help="End after so many seconds.", show_default=False)
@@ -86,9 +96,7 @@ def live(
         with StopSignals() as stop, Viewing(looks) as viewing, Display(viewing, quiet=quiet, as_json=json) as display:
             for link in (*links[0], *links[1]):
                 display.say(f"Listening on {link.url}.")
-            summary = run_live(
-                links[0], links[1], setup, seconds=seconds, watch=display.watch, asked_to_stop=stop
-            )
+            summary = run_live(links[0], links[1], setup, seconds=seconds, watch=display.watch, asked_to_stop=stop)
         display.show(summary)
     except (LinkError, FolderError) as error:
         raise UsageError(str(error)) from error

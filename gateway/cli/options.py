@@ -42,31 +42,45 @@ class Association(StrEnum):
 
 SiteOption = Annotated[
     Path | None,
-    typer.Option("--site", metavar="FILE", help="Site file (TOML): the runway and the radars. Without one the stream tells.", show_default=False),
+    typer.Option(
+        "--site",
+        metavar="FILE",
+        help="Site file (TOML): the runway and the radars. Without one the stream tells.",
+        show_default=False,
+    ),
 ]
 ViewerOption = Annotated[
     Viewer | None,
-    typer.Option("--viewer", help="native: a window; web: an address for the browser; none. [default: native, web without a screen]", show_default=False),
+    typer.Option(
+        "--viewer",
+        help="native: a window; web: an address for the browser; none. [default: native, web without a screen]",
+        show_default=False,
+    ),
 ]
 ServeOption = Annotated[
     str | None,
     typer.Option(
         "--serve",
         metavar="HOST:PORT",
-        help="Where viewers find the session, such as 0.0.0.0:9876 for all of a network. [default: this machine only, a free port]",
+        help="Where viewers find the session, such as 0.0.0.0:9876 for a network. [default: this machine, a free port]",
         show_default=False,
     ),
 ]
 ArchiveOption = Annotated[
     Path | None,
-    typer.Option("--archive", metavar="DIR", help="Keep the session: a folder of its own inside DIR.", show_default=False),
+    typer.Option(
+        "--archive", metavar="DIR", help="Keep the session: a folder of its own inside DIR.", show_default=False
+    ),
 ]
 WeightingOption = Annotated[
     Weighting,
-    typer.Option("--weighting", help="How GPS and radar are weighed: bias estimates the GPS error; the others are paper 003's."),
+    typer.Option(
+        "--weighting", help="How GPS and radar are weighed: bias estimates the GPS error; the others are paper 003's."
+    ),
 ]
 AssociationOption = Annotated[
-    Association, typer.Option("--association", help="When a radar track and an aircraft are one: ours, or paper 003's literally.")
+    Association,
+    typer.Option("--association", help="When a radar track and an aircraft are one: ours, or paper 003's literally."),
 ]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress and no summary; only failures.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the summary as one JSON object.")]
@@ -99,7 +113,9 @@ def read_keys(place: Place | None, site_path: Path | None) -> dict[int, bytes]:
             try:
                 keys[radar.number] = path.read_bytes().strip()
             except OSError as error:
-                raise UsageError(f"The key file of radar {radar.number}, {path}, cannot be read: {error.strerror}.") from error
+                raise UsageError(
+                    f"The key file of radar {radar.number}, {path}, cannot be read: {error.strerror}."
+                ) from error
             if not keys[radar.number]:
                 raise UsageError(f"The key file of radar {radar.number}, {path}, is empty.")
     return keys
@@ -130,7 +146,9 @@ def read_serve(text: str | None, viewer: Viewer) -> Serve | None:
         return None if viewer is Viewer.none else Serve()
     host, colon, port = text.rpartition(":")
     if not colon or not host or not port.isdigit() or int(port) > 65535:
-        raise UsageError(f"--serve {text!r} is not HOST:PORT; write 127.0.0.1:9876 for this machine, 0.0.0.0:9876 for its network.")
+        raise UsageError(
+            f"--serve {text!r} is not HOST:PORT; write 127.0.0.1:9876 for this machine, 0.0.0.0:9876 for its network."
+        )
     return Serve(host.strip("[]"), int(port))
 
 

@@ -31,8 +31,12 @@ def register(app: typer.Typer) -> None:
 
 def play(
     files: FilesArgument,
-    mavlink: Annotated[str, typer.Option("--mavlink", metavar="URL", help="Where MAVLink frames go.")] = "udpout:127.0.0.1:14550",
-    radar: Annotated[str, typer.Option("--radar", metavar="URL", help="Where radar datagrams go.")] = "udpout:127.0.0.1:30070",
+    mavlink: Annotated[
+        str, typer.Option("--mavlink", metavar="URL", help="Where MAVLink frames go.")
+    ] = "udpout:127.0.0.1:14550",
+    radar: Annotated[
+        str, typer.Option("--radar", metavar="URL", help="Where radar datagrams go.")
+    ] = "udpout:127.0.0.1:30070",
     speed: Annotated[str, typer.Option("--speed", metavar="max|N", help="N times its own pace.")] = "1",
     quiet: take.QuietOption = False,
 ) -> None:

@@ -27,7 +27,8 @@ Examples:
 """
 
 FilesArgument = Annotated[
-    list[Path], typer.Argument(metavar="FILE|SESSION...", help="Recordings, or one archived session.", show_default=False)
+    list[Path],
+    typer.Argument(metavar="FILE|SESSION...", help="Recordings, or one archived session.", show_default=False),
 ]
 
 
@@ -56,18 +57,27 @@ def replay(
     site: take.SiteOption = None,
     speed: Annotated[
         str | None,
-        typer.Option("--speed", metavar="max|N", help="N times its own pace. [default: 1 with a viewer, max without]", show_default=False),
+        typer.Option(
+            "--speed",
+            metavar="max|N",
+            help="N times its own pace. [default: 1 with a viewer, max without]",
+            show_default=False,
+        ),
     ] = None,
     viewer: take.ViewerOption = None,
     serve: take.ServeOption = None,
     archive: take.ArchiveOption = None,
     weighting: Annotated[
         take.Weighting | None,
-        typer.Option("--weighting", help="How GPS and radar are weighed. [default: the session's, else bias]", show_default=False),
+        typer.Option(
+            "--weighting", help="How GPS and radar are weighed. [default: the session's, else bias]", show_default=False
+        ),
     ] = None,
     association: Annotated[
         take.Association | None,
-        typer.Option("--association", help="When two are one. [default: the session's, else default]", show_default=False),
+        typer.Option(
+            "--association", help="When two are one. [default: the session's, else default]", show_default=False
+        ),
     ] = None,
     quiet: take.QuietOption = False,
     json: take.JsonOption = False,

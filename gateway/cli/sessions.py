@@ -28,7 +28,9 @@ def register(app: typer.Typer) -> None:
 
 
 def sessions(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder that --archive was given.", show_default=False)],
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="A folder that --archive was given.", show_default=False)
+    ],
     json: take.JsonOption = False,
 ) -> None:
     """List what is archived."""
@@ -40,7 +42,9 @@ def sessions(
     except FolderError as error:
         raise UsageError(str(error)) from error
     except OSError as error:
-        raise RunError(f"A session in {folder} could not be completed: {(error.strerror or str(error)).lower()}.") from error
+        raise RunError(
+            f"A session in {folder} could not be completed: {(error.strerror or str(error)).lower()}."
+        ) from error
     if json:
         import json as text
 

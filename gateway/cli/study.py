@@ -29,7 +29,9 @@ def studies() -> list[str]:
     """The names of the studies that there are."""
     found = importlib.util.find_spec("sim.studies")
     folders = list(found.submodule_search_locations or []) if found else []
-    return sorted(path.stem for folder in folders for path in Path(folder).glob("*.py") if not path.stem.startswith("_"))
+    return sorted(
+        path.stem for folder in folders for path in Path(folder).glob("*.py") if not path.stem.startswith("_")
+    )
 
 
 def study(
@@ -37,7 +39,8 @@ def study(
     runs: Annotated[int, typer.Option("--runs", metavar="N", min=1, help="How often each case is drawn.")] = 200,
     seed: Annotated[int, typer.Option("--seed", metavar="N", help="Of the random numbers.")] = 1,
     rrd: Annotated[
-        Path | None, typer.Option("--rrd", metavar="FILE", help="Where the figures go. [default: NAME.rrd]", show_default=False)
+        Path | None,
+        typer.Option("--rrd", metavar="FILE", help="Where the figures go. [default: NAME.rrd]", show_default=False),
     ] = None,
     quiet: take.QuietOption = False,
     json: take.JsonOption = False,

@@ -26,7 +26,7 @@ def chosen(viewer: Viewer | None) -> Viewer:
 
 
 class Viewing:
-    """Opens the viewer as soon as the session has an address. A window outlives the session, so that one can go on looking."""
+    """Opens the viewer as soon as the session has an address. A window outlives the session: one can go on looking."""
 
     def __init__(self, viewer: Viewer) -> None:
         self._viewer = viewer

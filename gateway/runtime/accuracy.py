@@ -1,7 +1,7 @@
 """How far GPS reports, radar plots and the fused track were from the truth, where a simulator tells it.
 
-Only read from pictures, never fed back. Scores are settled every few seconds, so memory does not grow with the pictures:
-one float an error remains.
+Only read from pictures, never fed back. Scores are settled every few seconds, so memory does not grow with the
+pictures: one float an error remains.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ class Accuracy:
             truths.forget_before(min(now - _WAIT_FOR_TRUTH_NS, truths.time[-1]) if truths.time else 0)
 
     def _distances(self, truths: _Truths, rows: list[tuple[int, Floats]]) -> Floats:
-        """Distance of each row to the interpolated truth (m); NaN where the truth has a gap, or the row a component less."""
+        """Distance of each row to the interpolated truth (m); NaN where the truth has a gap or a component lacks."""
         known = np.array(truths.time, dtype=np.int64)
         height = np.array(truths.height_m) + np.where(truths.msl, self._separation_m, 0.0)
         path = self._frame.runway_from_geodetic(truths.latitude_rad, truths.longitude_rad, height)
@@ -144,7 +144,11 @@ class Accuracy:
         """Scores by what was scored: "gps", "radar", and the fused track by its state ("fused", "gps only", ...)."""
         if self._settled_at is not None:
             self._settle(self._settled_at + _SETTLE_NS)
-        return {kind: _score(np.array(self._errors[kind], dtype=np.float64)) for kind in sorted(self._errors) if self._errors[kind]}
+        return {
+            kind: _score(np.array(self._errors[kind], dtype=np.float64))
+            for kind in sorted(self._errors)
+            if self._errors[kind]
+        }
 
 
 def _score(errors: Floats) -> Score:

@@ -1,7 +1,7 @@
-"""A session's folder: session.json and the names beside it (the layout stands in docs and in every session.json's reader).
+"""A session's folder: session.json, and the names beside it.
 
-session.json is always whole: it is written beside itself and renamed. It is written at the start, each time the session's
-files are flushed, and at the end, so that the folder of a killed session says nearly everything.
+session.json is always whole: it is written beside itself and renamed. It is written at the start, each time the
+session's files are flushed, and at the end, so that the folder of a killed session says nearly everything.
 """
 
 from __future__ import annotations
@@ -78,7 +78,9 @@ def make_folder(parent: Path, name: str) -> Path:
     Raises FolderError when `parent` is a session itself, is no folder or cannot be written.
     """
     if (parent / SESSION_FILE).exists():
-        raise FolderError(f"{parent} is a session already; name the folder that sessions are kept in, such as {parent.parent}.")
+        raise FolderError(
+            f"{parent} is a session already; name the folder that sessions are kept in, such as {parent.parent}."
+        )
     try:
         parent.mkdir(parents=True, exist_ok=True)
         for attempt in range(1, 1000):
@@ -90,7 +92,9 @@ def make_folder(parent: Path, name: str) -> Path:
             (folder / INPUTS).mkdir()
             return folder
     except FileExistsError as error:
-        raise FolderError(f"{parent} is a file; --archive needs a folder, which is made if it does not exist.") from error
+        raise FolderError(
+            f"{parent} is a file; --archive needs a folder, which is made if it does not exist."
+        ) from error
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise FolderError(f"{parent} cannot be written to ({reason}); choose another folder for --archive.") from error
@@ -118,7 +122,9 @@ def read_record(folder: Path) -> Record:
     except FileNotFoundError as error:
         raise FolderError(f"{folder} is no session: it has no {SESSION_FILE}.") from error
     except (OSError, ValueError) as error:
-        raise FolderError(f"{path} cannot be read ({error}); the session's inputs can still be replayed one by one.") from error
+        raise FolderError(
+            f"{path} cannot be read ({error}); the session's inputs can still be replayed one by one."
+        ) from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise FolderError(f"{path} is not of a format that this version of Talkdown knows.")
     try:

@@ -29,7 +29,7 @@ class _Peer:
         self.stream: int | None = None
 
     def cut(self, chunk: Chunk) -> list[bytes]:
-        """The whole frames; what remains of a datagram, or of a connection that was lost, never reaches the next one."""
+        """The whole frames; what remains of a datagram, or of a lost connection, never reaches the next one."""
         if chunk.stream is None:
             return self.scanner.feed_datagram(chunk.data)
         if chunk.stream != self.stream:

@@ -1,8 +1,8 @@
 """Links: where bytes come in. UDP, TCP client, serial; none of them blocks, none of them sends telemetry.
 
-A link answers three questions: what it can be waited on by (`fileno`), what has come in (`receive`), and how it is doing
-(`counters`). The gateway is passive; the one thing that a link ever sends is the empty datagram of a `udpout` link, once a
-second until its peer answers: it carries no MAVLink, and without it the peer could not know where we are.
+A link answers three questions: what it can be waited on by (`fileno`), what has come in (`receive`), and how it is
+doing (`counters`). The gateway is passive; the one thing that a link ever sends is the empty datagram of a `udpout`
+link, once a second until its peer answers: it carries no MAVLink, and without it the peer could not know where we are.
 """
 
 from __future__ import annotations

@@ -1,14 +1,15 @@
-"""The loops that drive a session: live, in ticks of at most 20 ms; replayed, as fast as it goes or at the pace of old."""
+"""The loops that drive a session: live, in ticks of at most 20 ms; replayed, at full speed or at the pace of old."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
+from gateway.runtime.playback import Playback
+
 from adapters import Arrival
 from gateway.picture import Picture
 from gateway.runtime.links import Link
-from gateway.runtime.playback import Playback
 from gateway.runtime.receiver import Receiver
 from gateway.runtime.run import Run
 from gateway.runtime.setup import RunFailure, Setup
@@ -101,7 +102,7 @@ def run_replay(
     asked_to_stop: AskedToStop = _never,
     step_ns: int | None = None,
 ) -> Summary:
-    """Run recordings again: as fast as it goes, or at `speed` times their own pace. Any `step_ns` gives the same numbers.
+    """Run recordings again: as fast as it goes, or at `speed` times their pace. Any `step_ns` gives the same numbers.
 
     Raises RunFailure when the archive cannot be written.
     """

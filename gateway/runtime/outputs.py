@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 
 from gateway.picture import Picture
 from gateway.runtime.setup import Serve
+from gateway.runtime.urls import LinkError
 from gateway.settings import Site
 from gateway.sinks import Sink
 from gateway.sinks.arrow import ArrowSink
@@ -13,25 +15,35 @@ from gateway.sinks.parquet import finish
 from gateway.sinks.rerun import RerunSink
 
 RRD_FILE = "session.rrd"
+_WATCHED = (0.4, 256)  # seconds and rows that are drawn at once, for people who look on
+_UNWATCHED = (10.0, 4096)  # where a recording is replayed as fast as it goes: fewer, larger batches cost less
 
 
 class Outputs:
-    """The sinks of one session. Raises OSError when what must be kept could not be."""
+    """The sinks of one session. `watched`: somebody looks on, or the session must survive a kill; small batches then.
 
-    def __init__(self, site: Site, folder: Path | None, serve: Serve | None) -> None:
+    Raises OSError when what must be kept could not be, LinkError when the viewers' port is taken.
+    """
+
+    def __init__(self, site: Site, folder: Path | None, serve: Serve | None, *, watched: bool = True) -> None:
         self._folder = folder
         self._sinks: list[Sink] = []
-        self.address: str | None = None  # where a viewer finds the session while it runs
+        self._rerun: RerunSink | None = None
         if folder is not None:
             self._sinks.append(ArrowSink(folder, geoid_separation_m=site.runway.geoid_separation_m or 0.0))
         if folder is not None or serve is not None:
-            drawn = RerunSink(
-                site,
-                path=None if folder is None else folder / RRD_FILE,
-                serve=None if serve is None else (serve.host, serve.port),
-            )
-            self._sinks.append(drawn)
-            self.address = drawn.address
+            self._rerun = _rerun(site, folder, serve, watched)
+            self._sinks.append(self._rerun)
+
+    @property
+    def address(self) -> str | None:
+        """Where a viewer finds the session while it runs."""
+        return self._rerun.address if self._rerun else None
+
+    @property
+    def dropped(self) -> int:
+        """Rows that viewers did not take in time; the archive has them."""
+        return self._rerun.dropped if self._rerun else 0
 
     def write(self, picture: Picture) -> None:
         """Hand one picture to every sink."""
@@ -54,3 +66,23 @@ class Outputs:
                 failure = error
         if failure is not None:
             raise failure
+
+
+def _rerun(site: Site, folder: Path | None, serve: Serve | None, watched: bool) -> RerunSink:
+    period_s, rows_limit = _WATCHED if watched else _UNWATCHED
+    try:
+        return RerunSink(
+            site,
+            path=None if folder is None else folder / RRD_FILE,
+            serve=None if serve is None else (serve.host, serve.port),
+            name=site.name if folder is None else folder.name,
+            period_s=period_s,
+            rows_limit=rows_limit,
+        )
+    except OSError as error:
+        if serve is None or error.errno not in (errno.EADDRINUSE, errno.EADDRNOTAVAIL, errno.EACCES):
+            raise
+        raise LinkError(
+            f"Viewers cannot be served on {serve.host}:{serve.port}: the port is taken or not ours to take; "
+            "give --serve another one, or leave it out."
+        ) from error

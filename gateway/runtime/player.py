@@ -1,4 +1,4 @@
-"""A recording sent onto UDP at its own intervals: each MAVLink peer from a socket of its own, so that it is heard as one."""
+"""A recording sent onto UDP at its own intervals: each MAVLink peer from a socket of its own."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ import time
 from collections import Counter
 from collections.abc import Callable
 
-from gateway.runtime.links import resolve
 from gateway.runtime.playback import Playback
+
+from gateway.runtime.links import resolve
 from gateway.runtime.urls import Url
 
 _SLEEP_AT_MOST_S = 0.1  # so that a request to stop is heard

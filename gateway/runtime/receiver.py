@@ -73,7 +73,7 @@ class Receiver:
         return delivery
 
     def close(self) -> None:
-        """Stop receiving, take in what the kernel still holds, and let go of the ports; `drain` once more after this."""
+        """Stop receiving, take in what the kernel still holds, let go of the ports; `drain` once more after this."""
         self._closing.set()
         if self._thread.is_alive():
             self._thread.join()
@@ -120,7 +120,9 @@ class Receiver:
                 self._overflow += len(arrivals) - max(room, 0)
                 if not self._overflow_told:
                     self._overflow_told = True
-                    notes.append(("error", "This machine is too slow for what comes in: arrivals are being lost (counted)."))
+                    notes.append(
+                        ("error", "This machine is too slow for what comes in: arrivals are being lost (counted).")
+                    )
             self._notes += notes
             self._watermark = self._stamper.watermark()
         return len(heard)

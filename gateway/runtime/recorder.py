@@ -1,4 +1,4 @@
-"""The recorder: a session's inputs, byte for byte, and session.json. It never drops; a disk that refuses ends the session."""
+"""The recorder: a session's inputs, byte for byte, and session.json. It never drops: a full disk ends the session."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from adapters import Arrival, Source
 from adapters.pcap import PcapWriter
 from adapters.tlog import TlogWriter
+
+from adapters import Arrival, Source
 from gateway.runtime.folder import INPUTS, InputFile, Record, write_record
 from gateway.runtime.hold import Hold
 from gateway.runtime.wholefile import WholeFile

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from adapters.files import last_stamp
+
 from gateway.runtime.folder import SESSION_FILE, FolderError, Record, read_record, write_record
 from gateway.runtime.hold import is_held
 from gateway.runtime.outputs import RRD_FILE
@@ -46,7 +47,7 @@ def session_folders(parent: Path) -> list[Path]:
 
 
 def sessions(parent: Path) -> Iterator[Listed]:
-    """Every session of a folder, mended first where it was killed. Raises FolderError, and OSError when mending cannot write."""
+    """Every session of a folder, mended first where it was killed. Raises FolderError; OSError when mending fails."""
     for folder in session_folders(parent):
         mended = mend(folder)
         size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())

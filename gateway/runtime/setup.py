@@ -32,7 +32,7 @@ class Serve:
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """How to run. Without a place the stream must tell one; without an archive (a folder of sessions) nothing is kept."""
+    """How to run. Without a place the stream must tell one; without an archive (sessions' folder) nothing is kept."""
 
     place: Place | None = None
     options: Options = field(default_factory=Options)

@@ -13,7 +13,7 @@ from typing import Any, Self
 
 
 class StopSignals:
-    """A context in which signals only ask. Outside the main thread (as in tests) it changes nothing and is never asked."""
+    """A context in which signals only ask. Outside the main thread it changes nothing and is never asked."""
 
     def __init__(self) -> None:
         self.asked_by: str | None = None
@@ -29,7 +29,9 @@ class StopSignals:
                 self._before[number] = signal.signal(number, self._ask)
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         for number, before in self._before.items():
             signal.signal(number, before)
 

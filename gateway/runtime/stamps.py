@@ -1,7 +1,7 @@
 """The receiver's stamps: strictly increasing multiples of 4 microseconds over all links of a session.
 
-A stamp is when we heard, in ns since 1970 UTC. Multiples of 4 us leave the low two bits of a .tlog's microseconds 0, and
-a stamp that no other arrival has makes the order of a replay the order it was live.
+A stamp is when we heard, in ns since 1970 UTC. Multiples of 4 us leave the low two bits of a .tlog's microseconds 0,
+and a stamp that no other arrival has makes the order of a replay the order it was live.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Byte-stream links: a TCP client and a serial port. Both must work at the start; later they come back by themselves."""
+"""Byte-stream links: a TCP client and a serial port. Both must work at the start, and come back later by themselves."""
 
 from __future__ import annotations
 
@@ -54,7 +54,9 @@ class TcpLink:
         try:
             self._socket: socket.socket | None = socket.create_connection(self._address, timeout=_CONNECT_TIMEOUT_S)
         except OSError as error:
-            raise LinkError(f"{url}: {_reason(error)}; start what should answer there first, or correct the address.") from error
+            raise LinkError(
+                f"{url}: {_reason(error)}; start what should answer there first, or correct the address."
+            ) from error
         self._prepare(self._socket)
 
     def _prepare(self, connection: socket.socket) -> None:
@@ -90,11 +92,10 @@ class TcpLink:
 
     def tend(self, now_ns: int) -> None:
         """Connect again when it is time."""
-        if self._socket is None:
-            if self._retries.is_due(now_ns):
-                self._socket = socket.socket(self._family, socket.SOCK_STREAM)
-                self._prepare(self._socket)
-                self._connecting = True
+        if self._socket is None and self._retries.is_due(now_ns):
+            self._socket = socket.socket(self._family, socket.SOCK_STREAM)
+            self._prepare(self._socket)
+            self._connecting = True
         if self._socket is None or not self._connecting:
             return
         code = self._socket.connect_ex(self._address)
@@ -149,7 +150,10 @@ class SerialLink:
             return []
         try:
             data = bytes(self._port.read(_READ_BYTES))
-        except (OSError, TypeError) as error:  # a radio that was unplugged; TypeError is pyserial's, closed while reading
+        except (
+            OSError,
+            TypeError,
+        ) as error:  # a radio that was unplugged; TypeError is pyserial's, closed while reading
             self.counters["connections lost"] += 1
             self.news.append(("warning", f"{self.url}: {_reason(error)}; trying again."))
             self.close()

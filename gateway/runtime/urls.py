@@ -1,9 +1,9 @@
 """Where a link leads, written as MAVLink people write it: `udpin:0.0.0.0:14550`, `tcp:127.0.0.1:5760`.
 
-    udpin:HOST:PORT     listen; any number of peers may send to us
-    udpout:HOST:PORT    send to a peer (play, simulate), or call on one and hear what it answers (live)
-    tcp:HOST:PORT       connect as a client
-    serial:DEVICE:BAUD  a radio or an autopilot on a serial port
+udpin:HOST:PORT     listen; any number of peers may send to us
+udpout:HOST:PORT    send to a peer (play, simulate), or call on one and hear what it answers (live)
+tcp:HOST:PORT       connect as a client
+serial:DEVICE:BAUD  a radio or an autopilot on a serial port
 """
 
 from __future__ import annotations
@@ -60,7 +60,9 @@ def parse_url(text: str, default_port: int = MAVLINK_PORT) -> Url:
     if scheme == "udpin":
         return Url("udpin", host or "0.0.0.0", port)
     if not host:
-        raise LinkError(f"{text!r} does not say where to: write {scheme}:HOST:PORT, such as {scheme}:127.0.0.1:{default_port}.")
+        raise LinkError(
+            f"{text!r} does not say where to: write {scheme}:HOST:PORT, such as {scheme}:127.0.0.1:{default_port}."
+        )
     if port == 0:
         raise LinkError(f"{text!r} has the port 0, where nobody can be; write a port from 1 to 65535.")
     return Url("udpout" if scheme == "udpout" else "tcp", host, port)
@@ -91,7 +93,9 @@ def _serial(text: str, rest: str) -> Url:
 def _host_and_port(text: str, rest: str, default_port: int) -> tuple[str, int]:
     shape = re.fullmatch(r"(?:\[(?P<six>[^\]]+)\]|(?P<host>[^:\[\]]*))(?::(?P<port>[^:]*))?", rest)
     if shape is None:
-        raise LinkError(f"{text!r} is not HOST:PORT; put an IPv6 address in brackets, such as udpin:[::1]:{default_port}.")
+        raise LinkError(
+            f"{text!r} is not HOST:PORT; put an IPv6 address in brackets, such as udpin:[::1]:{default_port}."
+        )
     host, port = shape["six"] or shape["host"] or "", shape["port"]
     if port is None and host.isdigit():
         host, port = "", host

@@ -1,8 +1,8 @@
 """A file that grows by whole records: whatever happens, it ends with a whole one.
 
-Records gather in memory and are written at `flush`. When the disk is full, or a limit is reached, the file is cut back to
-the last record that fits, so that it opens afterwards. Nothing is rewritten: a process that is killed loses what it had
-not flushed, and at worst leaves a cut last record, which every reader of these formats must survive.
+Records gather in memory and are written at `flush`. When the disk is full, or a limit is reached, the file is cut back
+to the last record that fits, so that it opens afterwards. Nothing is rewritten: a process that is killed loses what it
+had not flushed, and at worst leaves a cut last record, which every reader of these formats must survive.
 """
 
 from __future__ import annotations

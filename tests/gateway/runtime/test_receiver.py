@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterator
 
 import pytest
+
 from adapters import Arrival, Source
 from adapters.mavlink_frames import encode
 from gateway.runtime.links import Link, open_link
@@ -179,7 +180,9 @@ def test_a_radar_link_is_one_source_and_each_datagram_one_arrival(
     assert delivery.arrivals[0].peer == f"127.0.0.1:{sender.getsockname()[1]}"
 
 
-def test_a_tcp_link_hears_frames_that_are_cut_anywhere_and_comes_back_after_a_loss(links: Callable[[str], Link]) -> None:
+def test_a_tcp_link_hears_frames_that_are_cut_anywhere_and_comes_back_after_a_loss(
+    links: Callable[[str], Link],
+) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         link = links(f"tcp:127.0.0.1:{server.getsockname()[1]}")
         receiver = Receiver([link], [])
@@ -252,8 +255,6 @@ def test_a_serial_port_that_is_not_there_is_refused_with_what_to_do() -> None:
 def test_an_error_in_the_receiving_thread_reaches_the_one_who_drains(links: Callable[[str], Link]) -> None:
     class Broken:
         url = parse_url("udpin:127.0.0.1:1")
-        news: list[tuple[str, str]] = []
-        counters: dict[str, int] = {}
 
         def tend(self, now_ns: int) -> None:
             raise MemoryError("no more")
@@ -263,8 +264,6 @@ def test_an_error_in_the_receiving_thread_reaches_the_one_who_drains(links: Call
 
     receiver = Receiver([Broken()], [])  # type: ignore[list-item]
     receiver.start()
-    with pytest.raises(MemoryError):
-        for _ in range(10_000):
-            receiver.drain()
-            time.sleep(0.001)
     receiver.close()
+    with pytest.raises(MemoryError):
+        receiver.drain()

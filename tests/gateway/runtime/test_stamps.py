@@ -1,8 +1,9 @@
 """The receiver's stamps."""
 
-from gateway.runtime.stamps import Stamper
 from hypothesis import given
 from hypothesis import strategies as st
+
+from gateway.runtime.stamps import Stamper
 
 
 class Clocks:

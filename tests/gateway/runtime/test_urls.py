@@ -1,6 +1,7 @@
 """URLs of links, as MAVLink people write them."""
 
 import pytest
+
 from gateway.runtime.urls import LinkError, Url, parse_url
 
 
