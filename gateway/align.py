@@ -136,7 +136,17 @@ def place_reports(
         speed = max(report.velocity_sigma_mps or site.position.velocity_sigma_mps, LEAST_VELOCITY_SIGMA_MPS)
         comparable = report.timing in (Timing.UTC, Timing.ENVELOPE)
         fixes.append(
-            Fix(report.valid_at, 0, report.received_at, report.aircraft, enu[row], sigma, velocity[row], speed, comparable)
+            Fix(
+                report.valid_at,
+                0,
+                report.received_at,
+                report.aircraft,
+                enu[row],
+                sigma,
+                velocity[row],
+                speed,
+                comparable,
+            )
         )
     return fixes
 

@@ -152,7 +152,9 @@ def await_plots(state: Association, fix: Fix) -> Association:
 
     rival = next((other for other in state.waiting if same(other)), None)
     done = next((check.fix for check in state.checks if same(check.fix)), None)
-    earlier = [other for other in (rival, done) if other is not None and (other.at, other.serial) <= (fix.at, fix.serial)]
+    earlier = [
+        other for other in (rival, done) if other is not None and (other.at, other.serial) <= (fix.at, fix.serial)
+    ]
     if earlier or not fix.comparable:
         return state
     waiting = [other for other in state.waiting if other is not rival]
@@ -167,7 +169,9 @@ def check_due(state: Association, tracks: RadarTracks, setting: Setting) -> Asso
     kept = tuple(c for c in state.checks if not (c.fix.aircraft == fix.aircraft and c.fix.at // SECOND == second))
     place = bisect_left(kept, (fix.at, fix.aircraft), key=lambda check: check.order)
     if len(kept) < len(state.checks):  # a report of the same second was checked already: begin where either stands
-        place = min(place, next(i for i, (a, b) in enumerate(zip((*kept, None), state.checks, strict=False)) if a is not b))
+        place = min(
+            place, next(i for i, (a, b) in enumerate(zip((*kept, None), state.checks, strict=False)) if a is not b)
+        )
     before = state.checks[place].before if place < len(state.checks) else state.ledger
     tail = sorted((fix, *(check.fix for check in kept[place:])), key=lambda f: (f.at, f.aircraft))
     return _fold(replace(state, waiting=rest, checks=kept[:place], ledger=before), tail, tracks, setting)
@@ -235,7 +239,9 @@ def _latest_index(spans: Sequence[Span], key: Key) -> int:
     return max((span.index for span in spans if span.key == key), default=0)
 
 
-def _compare(fix: Fix, tracks: RadarTracks, ledger: Ledger, setting: Setting) -> tuple[tuple[Comparison, ...], frozenset[Key]]:
+def _compare(
+    fix: Fix, tracks: RadarTracks, ledger: Ledger, setting: Setting
+) -> tuple[tuple[Comparison, ...], frozenset[Key]]:
     """One report against every radar track with plots near its time; far ones only if a counter knows them.
 
     Source: 003 2.3 eq 6. Deviation: sigma also holds the allowed systematic error of the position source.
@@ -244,7 +250,11 @@ def _compare(fix: Fix, tracks: RadarTracks, ledger: Ledger, setting: Setting) ->
     alive, found = set(), []
     places: dict[int, tuple[Floats, Floats]] = {}
     for key, plots in tracks.plots.items():
-        if plots[0].at > fix.at + wait or plots[-1].at < fix.at - int(SILENT_S * SECOND) or key[0] not in setting.radars:
+        if (
+            plots[0].at > fix.at + wait
+            or plots[-1].at < fix.at - int(SILENT_S * SECOND)
+            or key[0] not in setting.radars
+        ):
             continue
         alive.add(key)
         if key[0] not in places:
@@ -347,7 +357,9 @@ def _count(
         changes.append(Change(fix.at, "associated", aircraft, name_of(key), here))
     spans = ledger.spans
     if changes:
-        gone = tuple(replace(s, until=fix.at) if s.until is None and pairs.get(s.key) != s.aircraft else s for s in spans)
+        gone = tuple(
+            replace(s, until=fix.at) if s.until is None and pairs.get(s.key) != s.aircraft else s for s in spans
+        )
         now = {span.key for span in gone if span.until is None}
         begun = [(key, owner) for key, owner in pairs.items() if key not in now]
         spans = (*gone, *(Span(key, owner, fix.at, None, _latest_index(gone, key) + 1) for key, owner in begun))
@@ -367,14 +379,20 @@ def _assign(
         held = [key for key, owner in pairs.items() if owner == aircraft and key[0] == radar and key in alive]
         if held:
             continue
-        mine = [(counts[aircraft, key].distance, key) for (owner, key) in counts if owner == aircraft and key[0] == radar]
-        ready = [(d, key) for d, key in mine if key not in pairs and counts[aircraft, key].value >= full and key in alive]
+        mine = [
+            (counts[aircraft, key].distance, key) for (owner, key) in counts if owner == aircraft and key[0] == radar
+        ]
+        ready = [
+            (d, key) for d, key in mine if key not in pairs and counts[aircraft, key].value >= full and key in alive
+        ]
         if not ready:
             continue
         distance, best = min(ready)
         rivals = [d for d, key in mine if key != best and key not in pairs and key in alive]
         owned = {owner for key, owner in pairs.items() if key[0] == radar and key in alive}
-        rivals += [c.distance for (owner, key), c in counts.items() if key == best and owner != aircraft and owner not in owned]
+        rivals += [
+            c.distance for (owner, key), c in counts.items() if key == best and owner != aircraft and owner not in owned
+        ]
         if all(rival >= RIVAL_RATIO * distance for rival in rivals):
             taken.append(best)
     return taken

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from gateway import align, associate, fuse, predict, register, track
-from gateway.align import SECOND, Fix, Plot
+from gateway.align import SECOND, Fix, Geoid, Plot
 from gateway.associate import Change
 from gateway.frames import RadarFrame, RunwayFrame
 from gateway.fuse import Ended, Lanes
@@ -34,7 +34,7 @@ class State:
     options: Options
     frame: RunwayFrame
     radars: Mapping[int, RadarSite]
-    geoid: align.Geoid
+    geoid: Geoid
     tracks: RadarTracks = RadarTracks()
     association: associate.Association = associate.Association()
     registration: register.Registration = register.Registration()
@@ -56,13 +56,13 @@ class State:
 def initial(site: Site, options: Options = Options()) -> State:
     """The state before the first arrival."""
     radars = {radar.number: radar for radar in site.radars}
-    return State(site, options, RunwayFrame(site.runway), radars, align.Geoid(site.runway.geoid_separation_m))
+    return State(site, options, RunwayFrame(site.runway), radars, Geoid(site.runway.geoid_separation_m))
 
 
 def step(state: State, heard: Sequence[Heard], health: Health = Health()) -> tuple[State, Picture]:
     """What was heard, worked into the state; and the picture of what came of it."""
     work = Work(state)
-    fixes = iter(work.align(heard))
+    fixes = iter(work.place(heard))
     for item in heard:
         work.until(item.now, watermark=not item.observations)
         work.events += [Event(item.now, level, text) for level, text in item.notes]
@@ -99,7 +99,7 @@ class Work:
 
     # align ------------------------------------------------------------------------------------------------------
 
-    def align(self, heard: Sequence[Heard]) -> list[tuple[Fix, align.Geoid]]:
+    def place(self, heard: Sequence[Heard]) -> list[tuple[Fix, Geoid]]:
         """All GPS reports of the step as fixes in one batch, each with what was known of the geoid at its turn."""
         geoid, reports, heights, geoids = self.state.geoid, [], [], []
         for item in heard:
@@ -112,15 +112,19 @@ class Work:
         fixes = align.place_reports(reports, heights, self.state.site, self.state.frame)
         return list(zip(fixes, geoids, strict=True))
 
-    def take_fix(self, fix: Fix, geoid: align.Geoid, timing: Timing) -> None:
+    def take_fix(self, fix: Fix, geoid: Geoid, timing: Timing) -> None:
         """One GPS report: to its aircraft's track, and to be checked against the radar tracks."""
         fix = replace(fix, serial=self._next_serial())
         self.fixes.append(fix)
         self.state = replace(self.state, geoid=geoid)
         if abs(geoid.contradiction_m) > 5.0:
-            self.once(f"the streams give a geoid separation {geoid.contradiction_m:+.0f} m from the site file's; the site's is used")
+            self.once(
+                f"the streams give a geoid separation {geoid.contradiction_m:+.0f} m from the site file's; the site's is used"
+            )
         if geoid.site_m is None and not geoid.seen_m:
-            self.once("no geoid separation from the site or the stream: heights are taken as above mean sea level", "info")
+            self.once(
+                "no geoid separation from the site or the stream: heights are taken as above mean sea level", "info"
+            )
         if timing is Timing.FOREIGN or not self._is_timely(fix.at, fix.aircraft):
             return
         self._settle(self.state.lanes.by_aircraft.get(fix.aircraft))
@@ -213,7 +217,9 @@ class Work:
         history = int(state.options.history_s * SECOND)
         if state.now is None or now < state.now - history:
             if state.now is not None:
-                self._start_again(f"the session's time went back by {(state.now - now) / SECOND:.0f} s: tracks start again")
+                self._start_again(
+                    f"the session's time went back by {(state.now - now) / SECOND:.0f} s: tracks start again"
+                )
             self.state = replace(self.state, instant=now // SECOND * SECOND + SECOND)
         while True:
             due = self.state.association.due
@@ -227,7 +233,9 @@ class Work:
                 idle = not self.state.lanes.lanes and self.state.association.due is None
                 following = now // SECOND * SECOND if idle else at
                 self.state = replace(self.state, instant=max(following, at) + SECOND)
-        self.state = replace(self.state, now=max(now, self.state.now or now) if not _jumped(self.state.now, now, history) else now)
+        self.state = replace(
+            self.state, now=max(now, self.state.now or now) if not _jumped(self.state.now, now, history) else now
+        )
 
     def _whole_second(self, at: int) -> None:
         """Ends, coasting, predictions, and forgetting what is older than the history."""
@@ -307,11 +315,15 @@ class Work:
         now = self.state.now or at
         if at < now - history:
             self.count("too late")
-            self.once(f"{source} is more than {self.state.options.history_s:.0f} s late: such data are counted, not used")
+            self.once(
+                f"{source} is more than {self.state.options.history_s:.0f} s late: such data are counted, not used"
+            )
             return False
         if at > now + history:
             self.count("from the future")
-            self.once(f"{source} is dated more than {self.state.options.history_s:.0f} s ahead: such data are counted, not used")
+            self.once(
+                f"{source} is dated more than {self.state.options.history_s:.0f} s ahead: such data are counted, not used"
+            )
             return False
         return True
 

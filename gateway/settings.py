@@ -175,7 +175,11 @@ def _text(*allowed: str) -> Convert:
 
 
 def _polygon(value: Any) -> tuple[tuple[float, float], ...]:
-    if not isinstance(value, list) or len(value) < 3 or not all(isinstance(corner, list) and len(corner) == 2 for corner in value):
+    if (
+        not isinstance(value, list)
+        or len(value) < 3
+        or not all(isinstance(corner, list) and len(corner) == 2 for corner in value)
+    ):
         raise ValueError("must be a list of at least three [latitude, longitude] corners in degrees")
     return tuple((_LATITUDE(latitude), _LONGITUDE(longitude)) for latitude, longitude in value)
 
@@ -244,10 +248,16 @@ _TABLES: dict[str, _Table] = {
         many=True,
     ),
     "decision_point": _Table(
-        {"name": ("name", _text()), "distance_m": ("distance_m", _number(0.0, 1e6))}, required=("name", "distance_m"), many=True
+        {"name": ("name", _text()), "distance_m": ("distance_m", _number(0.0, 1e6))},
+        required=("name", "distance_m"),
+        many=True,
     ),
     "waypoint": _Table(
-        {"name": ("name", _text()), "latitude_deg": ("latitude_rad", _LATITUDE), "longitude_deg": ("longitude_rad", _LONGITUDE)},
+        {
+            "name": ("name", _text()),
+            "latitude_deg": ("latitude_rad", _LATITUDE),
+            "longitude_deg": ("longitude_rad", _LONGITUDE),
+        },
         required=("name", "latitude_deg", "longitude_deg"),
         many=True,
     ),
@@ -278,7 +288,9 @@ def parse_site(text: str, name: str = "site file") -> Site:
         raise SiteError(f"{name}: not TOML: {error}.") from error
     for key in document:
         if key != "name" and key not in _TABLES:
-            raise SiteError(f"{name}{_line_of(text, key)}: unknown {_kind(document[key])} {key!r}{_hint(key, ['name', *_TABLES])}.")
+            raise SiteError(
+                f"{name}{_line_of(text, key)}: unknown {_kind(document[key])} {key!r}{_hint(key, ['name', *_TABLES])}."
+            )
     title = document.get("name", "unnamed site")
     if not isinstance(title, str):
         raise SiteError(f"{name}{_line_of(text, 'name')}: name must be a text in quotes, not {title!r}.")
@@ -310,7 +322,9 @@ def parse_site(text: str, name: str = "site file") -> Site:
 def _weather(row: dict[str, Any], name: str) -> Weather:
     circle = all(key in row for key in ("latitude_rad", "longitude_rad", "radius_m"))
     if circle == bool(row.get("polygon_rad")):
-        raise SiteError(f"{name}: [[weather]] {row['name']!r} needs latitude_deg, longitude_deg and radius_m, or polygon_deg, not both.")
+        raise SiteError(
+            f"{name}: [[weather]] {row['name']!r} needs latitude_deg, longitude_deg and radius_m, or polygon_deg, not both."
+        )
     return Weather(**row)
 
 
@@ -320,7 +334,9 @@ def _read_table(document: Mapping[str, Any], table: str, text: str, name: str) -
     content = document.get(table, [] if shape.many else None)
     if content is None:
         return []
-    if isinstance(content, list) != shape.many or not all(isinstance(row, dict) for row in (content if shape.many else [content])):
+    if isinstance(content, list) != shape.many or not all(
+        isinstance(row, dict) for row in (content if shape.many else [content])
+    ):
         raise SiteError(f"{name}{_line_of(text, table)}: write {table} as a table, {label}.")
     read: list[dict[str, Any]] = []
     for index, row in enumerate(content if shape.many else [content]):
@@ -385,7 +401,14 @@ def format_site(site: Site) -> str:
     Angles are written to 1e-9 degrees (0.1 mm on the ground), lengths to 0.1 mm.
     """
     runway = site.runway
-    lines = [f'name = "{_escaped(site.name)}"', "", "[display]", f'units = "{site.units}"                # or "aviation"', "", "[runway]"]
+    lines = [
+        f'name = "{_escaped(site.name)}"',
+        "",
+        "[display]",
+        f'units = "{site.units}"                # or "aviation"',
+        "",
+        "[runway]",
+    ]
     lines += [
         f"latitude_deg = {runway.latitude_rad * _DEG:.9f}          # centre",
         f"longitude_deg = {runway.longitude_rad * _DEG:.9f}",
@@ -406,10 +429,24 @@ def format_site(site: Site) -> str:
         f"velocity_sigma_mps = {site.position.velocity_sigma_mps:g}",
     ]
     for radar in site.radars:
-        lines += ["", "[[radar]]", f"number = {radar.number}", f"along_m = {radar.along_m:.4f}              # antenna in the runway frame: x"]
-        lines += [f"left_m = {radar.left_m:.4f}               # y", f"antenna_height_m = {radar.antenna_height_m:.4f}     # z, above the runway plane"]
-        lines += [f"boresight_deg = {radar.compass_boresight_rad * _DEG % 360.0:.6f}", f"range_sigma_m = {radar.range_sigma_m:g}"]
-        lines += [f"azimuth_sigma_deg = {radar.azimuth_sigma_rad * _DEG:.6g}", f"elevation_sigma_deg = {radar.elevation_sigma_rad * _DEG:.6g}"]
+        lines += [
+            "",
+            "[[radar]]",
+            f"number = {radar.number}",
+            f"along_m = {radar.along_m:.4f}              # antenna in the runway frame: x",
+        ]
+        lines += [
+            f"left_m = {radar.left_m:.4f}               # y",
+            f"antenna_height_m = {radar.antenna_height_m:.4f}     # z, above the runway plane",
+        ]
+        lines += [
+            f"boresight_deg = {radar.compass_boresight_rad * _DEG % 360.0:.6f}",
+            f"range_sigma_m = {radar.range_sigma_m:g}",
+        ]
+        lines += [
+            f"azimuth_sigma_deg = {radar.azimuth_sigma_rad * _DEG:.6g}",
+            f"elevation_sigma_deg = {radar.elevation_sigma_rad * _DEG:.6g}",
+        ]
         lines += [f"maximum_range_m = {radar.maximum_range_m:g}"]
         if radar.key_file:
             lines.append(f'key_file = "{_escaped(radar.key_file)}"')
@@ -417,16 +454,26 @@ def format_site(site: Site) -> str:
         lines += ["", "[[decision_point]]", f'name = "{_escaped(point.name)}"', f"distance_m = {point.distance_m:g}"]
     for waypoint in site.waypoints:
         lines += ["", "[[waypoint]]", f'name = "{_escaped(waypoint.name)}"']
-        lines += [f"latitude_deg = {waypoint.latitude_rad * _DEG:.9f}", f"longitude_deg = {waypoint.longitude_rad * _DEG:.9f}"]
+        lines += [
+            f"latitude_deg = {waypoint.latitude_rad * _DEG:.9f}",
+            f"longitude_deg = {waypoint.longitude_rad * _DEG:.9f}",
+        ]
     for area in site.weather:
         lines += ["", "[[weather]]", f'name = "{_escaped(area.name)}"']
         if area.latitude_rad is not None and area.longitude_rad is not None:
-            lines += [f"latitude_deg = {area.latitude_rad * _DEG:.9f}", f"longitude_deg = {area.longitude_rad * _DEG:.9f}"]
+            lines += [
+                f"latitude_deg = {area.latitude_rad * _DEG:.9f}",
+                f"longitude_deg = {area.longitude_rad * _DEG:.9f}",
+            ]
             lines += [f"radius_m = {area.radius_m:g}"]
         else:
-            corners = ", ".join(f"[{latitude * _DEG:.9f}, {longitude * _DEG:.9f}]" for latitude, longitude in area.polygon_rad)
+            corners = ", ".join(
+                f"[{latitude * _DEG:.9f}, {longitude * _DEG:.9f}]" for latitude, longitude in area.polygon_rad
+            )
             lines += [f"polygon_deg = [{corners}]"]
-        lines += [f'{key} = "{value}"' for key, value in (("from", area.valid_from), ("until", area.valid_until)) if value]
+        lines += [
+            f'{key} = "{value}"' for key, value in (("from", area.valid_from), ("until", area.valid_until)) if value
+        ]
     return "\n".join(lines) + "\n"
 
 
@@ -450,7 +497,9 @@ DEMO_SITE = Site(
         geoid_separation_m=-35.0,
     ),
     radars=(
-        RadarSite(number=1, along_m=300.0, left_m=150.0, antenna_height_m=3.0, compass_boresight_rad=math.radians(270.0)),
+        RadarSite(
+            number=1, along_m=300.0, left_m=150.0, antenna_height_m=3.0, compass_boresight_rad=math.radians(270.0)
+        ),
     ),
     decision_points=(DecisionPoint("DA", 1500.0),),
 )

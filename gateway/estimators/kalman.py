@@ -127,12 +127,16 @@ def update(
     reduced = -(gain @ h)
     diagonal = np.arange(SIZE)
     reduced[:, diagonal, diagonal] += 1.0
-    covariance = reduced @ state.covariance @ reduced.transpose(0, 2, 1) + (gain * r[:, None, :]) @ gain.transpose(0, 2, 1)
+    covariance = reduced @ state.covariance @ reduced.transpose(0, 2, 1) + (gain * r[:, None, :]) @ gain.transpose(
+        0, 2, 1
+    )
     covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))
     return Estimate(mean, covariance), Innovation(y, s, measured, normalised, outlying)
 
 
-def start(position: Floats, position_covariance: Floats, velocity: Floats, velocity_sigma: Floats, error_sigma_m: float) -> Estimate:
+def start(
+    position: Floats, position_covariance: Floats, velocity: Floats, velocity_sigma: Floats, error_sigma_m: float
+) -> Estimate:
     """First states of n tracks from a position (n, 3) with covariance (n, 3, 3) and a velocity (n, 3), sigma (n,)."""
     n = position.shape[0]
     mean = np.concatenate([position, velocity, np.zeros((n, 3))], axis=1)

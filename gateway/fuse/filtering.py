@@ -86,9 +86,10 @@ def _advance(
     mean, covariance, memory = _stacked([base for base in bases if base is not None], model)
     elapsed_s = np.array([(measures[row].at - bases[row].at) / SECOND for row in going])  # type: ignore[union-attr]
     if going:
+        literal = model.weighting == "literal"
         state = predict(Estimate(mean, covariance), elapsed_s, model.motion)
         groups: dict[tuple[str, int], list[int]] = {}
-        paired = {row: neighbours[row](measure) for row in going if _literal(measure := measures[row], model)}
+        paired = {row: neighbours[row](fix) for row in going if isinstance(fix := measures[row], Fix) and literal}
         for place, row in enumerate(going):
             groups.setdefault(_group(measures[row], paired.get(row)), []).append(place)
         for (kind, radar), places in groups.items():
@@ -112,10 +113,6 @@ def _stacked(bases: Sequence[Event], model: Model) -> tuple[Floats, Floats, Floa
     covariance = np.array([base.covariance for base in bases]).reshape(n, 9, 9)
     memory = np.array([base.memory for base in bases]).reshape(n, model.memory, 3)
     return mean, covariance, memory
-
-
-def _literal(measure: Measure, model: Model) -> bool:
-    return model.weighting == "literal" and isinstance(measure, Fix)
 
 
 def _group(measure: Measure, near: tuple[int, Floats, Floats] | None) -> tuple[str, int]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from gateway.align import SECOND, Fix, Plot, bracket
 from gateway.associate import Span, aircraft_of, ordinal_of
-from gateway.fuse.filtering import Event, Job, Measure, Neighbour, rank
+from gateway.fuse.filtering import Event, Floats, Job, Measure, Neighbour, rank
 from gateway.settings import Options
 from gateway.track import Key, RadarTracks, name_of
 
@@ -108,7 +108,7 @@ class Scene:
     def neighbour(self, lane: Lane) -> Neighbour:
         """The plot of this lane's radar track at a report's time, for the literal weighting."""
 
-        def at_time_of(fix: Fix) -> tuple[int, np.ndarray, np.ndarray] | None:  # type: ignore[type-arg]
+        def at_time_of(fix: Fix) -> tuple[int, Floats, Floats] | None:
             for span in self.spans:
                 if span.aircraft != lane.aircraft or aircraft_of(self.spans, span.key, fix.at) != lane.aircraft:
                     continue
@@ -199,7 +199,9 @@ def reroute(lanes: Lanes, old: tuple[Span, ...], scene: Scene) -> tuple[Lanes, l
     from_when: dict[str, int] = {}
     keys: dict[Key, int] = {}
     for key in sorted({span.key for span in {*old} ^ {*scene.spans}}):
-        for at in sorted({t for s in (*old, *scene.spans) if s.key == key for t in (s.since, s.until) if t is not None}):
+        for at in sorted(
+            {t for s in (*old, *scene.spans) if s.key == key for t in (s.since, s.until) if t is not None}
+        ):
             before, now = aircraft_of(old, key, at), aircraft_of(scene.spans, key, at)
             if before == now:
                 continue
@@ -245,7 +247,9 @@ def _inserted(lanes: Lanes, lane: Lane, measure: Measure, scene: Scene) -> tuple
     if scene.options.weighting == "literal" and isinstance(measure, Plot):
         # A report shortly before this plot was fused with an interpolation that this plot changes.
         first = measure.at - int(scene.options.association_wait_s * SECOND)
-        touched = next((i for i in range(1, place) if events[i].at >= first and isinstance(events[i].measure, Fix)), place)
+        touched = next(
+            (i for i in range(1, place) if events[i].at >= first and isinstance(events[i].measure, Fix)), place
+        )
         following = [*(event.measure for event in events[touched:place]), *following]
         place = touched
     job = Job(lane.track, events[place - 1] if place else None, following, scene.neighbour(lane), measure.serial)
@@ -330,5 +334,9 @@ def radar_names(lane: Lane, spans: Sequence[Span], at: int) -> str | None:
     """The radar tracks behind a lane at an instant, as people write them."""
     if lane.key is not None:
         return name_of(lane.key)
-    names = [name_of(s.key) for s in spans if s.aircraft == lane.aircraft and s.since <= at and (s.until is None or at < s.until)]
+    names = [
+        name_of(s.key)
+        for s in spans
+        if s.aircraft == lane.aircraft and s.since <= at and (s.until is None or at < s.until)
+    ]
     return " ".join(sorted(set(names))) or None

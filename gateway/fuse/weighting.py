@@ -48,12 +48,14 @@ class Model:
         return WINDOW if self.weighting == "innovation" else 0
 
 
-def start_from_fixes(position: Floats, sigma: Floats, velocity: Floats, velocity_sigma: Floats, model: Model) -> Estimate:
+def start_from_fixes(
+    position: Floats, sigma: Floats, velocity: Floats, velocity_sigma: Floats, model: Model
+) -> Estimate:
     """First states from GPS reports: positions, sigmas, velocities (n, 3; NaN = not measured), their sigma (n,).
 
     Position and source error are the two parts of one measured sum: their errors are opposite.
     """
-    unknown = np.isnan(velocity).any(axis=1)
+    unknown: NDArray[np.bool_] = np.asarray(np.isnan(velocity).any(axis=1))
     speed_sigma = np.where(unknown, START_SPEED_SIGMA_MPS, velocity_sigma)
     covariance = np.zeros((len(position), 3, 3))
     axis, error = np.arange(3), model.motion.error_sigma_m
@@ -77,7 +79,13 @@ def start_from_plots(polar: Floats, sigma: Floats, radar: int, model: Model) -> 
 
 
 def update_with_fixes(
-    state: Estimate, position: Floats, sigma: Floats, velocity: Floats, velocity_sigma: Floats, memory: Floats, model: Model
+    state: Estimate,
+    position: Floats,
+    sigma: Floats,
+    velocity: Floats,
+    velocity_sigma: Floats,
+    memory: Floats,
+    model: Model,
 ) -> tuple[Estimate, Innovation, Floats]:
     """States after GPS reports; arrays as in `start_from_fixes`; memory (n, w, 3) of past position innovations."""
     n = len(position)
@@ -100,9 +108,7 @@ def update_with_fixes(
     return after, told, memory
 
 
-def update_with_plots(
-    state: Estimate, polar: Floats, sigma: Floats, frame: RadarFrame
-) -> tuple[Estimate, Innovation]:
+def update_with_plots(state: Estimate, polar: Floats, sigma: Floats, frame: RadarFrame) -> tuple[Estimate, Innovation]:
     """States after plots of one radar: polar and sigma (n, 3), NaN components are left out. Source: 003 2.4 eq 17 to 20."""
     xyz = frame.from_enu(state.mean[:, POSITION])
     innovation = polar_difference(polar, polar_from_xyz(xyz))
@@ -144,5 +150,3 @@ def polar_difference(one: Floats, other: Floats) -> Floats:
     azimuth = difference[..., 1]
     difference[..., 1] = azimuth - 2.0 * math.pi * np.round(azimuth / (2.0 * math.pi))
     return difference
-
-
