@@ -1,7 +1,7 @@
 """003's case as arrays: what GPS and radar measured in many Monte Carlo runs, without wires, for studies.
 
-The same sensors as on the wires (`sim.sensors`), all runs at once. Variants of one seed and number of runs share their noise,
-so that what differs between two of them is the variant; another number of runs is another draw.
+The same sensors as on the wires (`sim.sensors`), all runs at once. Variants of one seed and number of runs share
+their noise, so that what differs between two of them is the variant; another number of runs is another draw.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Case:
     true: Flown  # (m,) at the times of the scans
     true_enu_m: Floats  # (m, 3) at the runway's centre
     true_range_m: Floats  # (m,) from the radar
-    ground_m: Floats  # (m,) ground distance from the runway's centre, the distance of 003's bands
+    along_m: Floats  # (m,) ground distance s along the approach from the runway's centre, 50 000 to 1500
 
     @property
     def runs(self) -> int:
@@ -77,11 +77,11 @@ def case_003(
 ) -> Case:
     """003's approach measured `runs` times.
 
-    `gps_error=False` takes the constant error of the position source away. `missing` names components ("range", "azimuth",
-    "elevation") that the radar never measures. `first_fix_s` (0.8) or `random_phase` move the times of the position source's
-    reports, which else are valid at 0.13 s, 5.13 s and so on. `abeam_deg` (3) adds the plots of a second aircraft, turned
-    about the radar by this angle; a positive angle is to the left. Raises ValueError for an unknown component.
-    Source: 003, the case.
+    `gps_error=False` takes the constant error of the position source away. `missing` names components ("range",
+    "azimuth", "elevation") that the radar never measures. `first_fix_s` (0.8) or `random_phase` move the times of the
+    position source's reports, which else are valid at 0.13 s, 5.13 s and so on. `abeam_deg` (3) adds the plots of a
+    second aircraft, turned about the radar by this angle; a positive angle is to the left. Raises ValueError for an
+    unknown component. Source: 003, the case.
     """
     gps = _gps_parameters(gps or GpsParameters(), gps_error, first_fix_s, random_phase)
     radar = _radar_parameters(radar or RadarParameters(), missing)
@@ -104,7 +104,6 @@ def case_003(
     valid = gps_times(gps, 0.0, path.end_s, gps_phases(gps, generator, (runs,)))
     measured = measure_gps(gps, valid, fly(path, site.runway, valid), generator)
     enu = runway.enu_from_geodetic(true.latitude_rad, true.longitude_rad, true.height_m)
-    at = path.motion(scans).position
     return Case(
         site=site,
         gps_parameters=gps,
@@ -116,7 +115,7 @@ def case_003(
         true=true,
         true_enu_m=enu,
         true_range_m=np.sqrt(np.sum(position * position, axis=-1)),
-        ground_m=np.hypot(at[:, 0], at[:, 1]),
+        along_m=-path.motion(scans).position[:, 0],
     )
 
 

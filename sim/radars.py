@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from adapters.landing_radar import MAXIMUM_PLOTS, Header, Plot, Status, encode
 from gateway.frames import RadarFrame, RunwayFrame, turn
@@ -27,9 +27,15 @@ class RadarSight:
 
     def see(self, flown: Flown) -> tuple[Floats, Floats]:
         """Positions m and velocities m/s (..., 3) in the radar's frame."""
-        enu = self._runway.enu_from_geodetic(flown.latitude_rad, flown.longitude_rad, flown.height_m)
-        local_from_enu = self._runway.local_from_enu(flown.latitude_rad, flown.longitude_rad)
-        velocity = np.sum(local_from_enu * flown.velocity_mps[..., :, None], axis=-2)  # by the transpose
+        return self.see_at(flown.latitude_rad, flown.longitude_rad, flown.height_m, flown.velocity_mps)
+
+    def see_at(
+        self, latitude_rad: ArrayLike, longitude_rad: ArrayLike, height_m: ArrayLike, velocity_mps: Floats
+    ) -> tuple[Floats, Floats]:
+        """The same for geodetic positions (...) and velocities east, north, up there (..., 3)."""
+        enu = self._runway.enu_from_geodetic(latitude_rad, longitude_rad, height_m)
+        local_from_enu = self._runway.local_from_enu(latitude_rad, longitude_rad)
+        velocity = np.sum(local_from_enu * velocity_mps[..., :, None], axis=-2)  # by the transpose
         return self._radar.from_enu(enu), turn(self._radar.radar_from_enu, velocity)
 
     def status(self, radar: RadarSite, period_s: float) -> Status:

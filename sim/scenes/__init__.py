@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gateway.settings import DEMO_SITE, Site
 from sim.overrides import OverrideError, SceneParameters, override
@@ -37,18 +37,26 @@ SCENES: Mapping[str, SceneKind] = {
 
 
 def build_scene(
-    name: str, *, site: Site = DEMO_SITE, seed: int = 0, start_ns: int, changes: Iterable[str] = ()
+    name: str,
+    *,
+    start_ns: int,
+    site: Site = DEMO_SITE,
+    seed: int = 0,
+    changes: Iterable[str] = (),
+    keys: Mapping[int, bytes] | None = None,
 ) -> Scene:
     """The scene of a name at a site, with changes such as "gps.period_s=1".
 
-    `start_ns` is the session's beginning, ns since 1970 UTC. Raises OverrideError (one plain sentence) for an
-    unknown scene or a change that cannot be made.
+    `start_ns` is the session's beginning, ns since 1970 UTC; `keys` are those that radars sign with, by number.
+    Raises OverrideError (one plain sentence) for an unknown scene or a change that cannot be made.
     """
     kind = SCENES.get(name)
     if kind is None:
         raise OverrideError(f"there is no scene {name!r}; there are {', '.join(SCENES)}.")
     parameters = override(as_the_site_says(kind.parameters, site), changes)
-    return kind.build(site, parameters, seed, start_ns)
+    scene = kind.build(site, parameters, seed, start_ns)
+    keyed = [replace(radar, key=(keys or {}).get(radar.site.number)) for radar in scene.radars]
+    return replace(scene, radars=tuple(keyed))
 
 
 __all__ = ["RESERVED", "SCENES", "OverrideError", "SceneKind", "SceneParameters", "build_scene"]
