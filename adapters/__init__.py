@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-DISTRIBUTION = "talkdown"  # another distribution on PyPI installs a package of this name; the program checks this at start
+DISTRIBUTION = (
+    "talkdown"  # another distribution on PyPI installs a package of this name; the program checks this at start
+)
 
 
 @dataclass(frozen=True, slots=True)

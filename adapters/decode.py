@@ -43,7 +43,9 @@ class _Listened:
         now = received_at // SECOND
         number = sum(count for second, count in self.lately if now - _RATE_S <= second < now)
         age_s = 0.0 if self.last_heard is None else max(received_at - self.last_heard, 0) / SECOND
-        reasons = tuple(sorted((reason, total) for reason, total in self.counters.items() if total and reason != "lost"))
+        reasons = tuple(
+            sorted((reason, total) for reason, total in self.counters.items() if total and reason != "lost")
+        )
         source = self.source
         return SourceHealth(source.name, source.kind, age_s, number / _RATE_S, max(self.counters["lost"], 0), reasons)
 
@@ -167,6 +169,8 @@ class Decoder:
             clock.is_named_foreign = True
             lag = self._epoch.lag_s(key)
             side = "behind" if lag > 0 else "ahead of"
-            text = f"The clock of radar {header.radar} is {abs(lag):.0f} s {side} the session's: it is shown, not fused."
+            text = (
+                f"The clock of radar {header.radar} is {abs(lag):.0f} s {side} the session's: it is shown, not fused."
+            )
             self._notes.append(("warning", text))
         return timing

@@ -1,8 +1,9 @@
 """GLOBAL_POSITION_INT and GPS_RAW_INT, paired: is there a fix, how good is it, and is this a position at all?
 
 GLOBAL_POSITION_INT is the autopilot's estimate: it carries no accuracy, is near (0, 0) before the estimator has an origin
-(its altitude stays near 0 until home is set), and goes on by dead reckoning when GPS is lost without saying so. GPS_RAW_INT tells the rest: fix type, accuracies, and
-the height above the ellipsoid; while GPS is lost its positions may go on moving with a frozen time.
+(its altitude stays near 0 until home is set), and goes on by dead reckoning when GPS is lost without saying so.
+GPS_RAW_INT tells the rest: fix type, accuracies, and the height above the ellipsoid; while GPS is lost its positions may
+go on moving with a frozen time.
 """
 
 from __future__ import annotations
@@ -18,7 +19,18 @@ GLOBAL_POSITION_INT, read_position = fields(
     "GLOBAL_POSITION_INT", "time_boot_ms", "lat", "lon", "alt", "relative_alt", "vx", "vy", "vz", "hdg"
 )
 GPS_RAW_INT, read_fix = fields(
-    "GPS_RAW_INT", "time_usec", "lat", "lon", "alt", "fix_type", "alt_ellipsoid", "h_acc", "v_acc", "vel_acc", "vel", "cog"
+    "GPS_RAW_INT",
+    "time_usec",
+    "lat",
+    "lon",
+    "alt",
+    "fix_type",
+    "alt_ellipsoid",
+    "h_acc",
+    "v_acc",
+    "vel_acc",
+    "vel",
+    "cog",
 )
 SECOND = 10**9
 _FROZEN_NS = 2 * SECOND
@@ -55,7 +67,7 @@ class Fixes:
     def hear_fix(self, payload: bytes, at: int) -> bool:
         """Take a GPS_RAW_INT in; whether it holds a fix that was not heard before."""
         usec, latitude, longitude, altitude, fix_type, ellipsoid, *accuracies, _, _ = read_fix(payload)
-        fresh = usec != self._usec
+        fresh: bool = usec != self._usec
         if fresh or usec == 0 or at < self._moved:
             self._usec, self._moved = usec, at
         self._fix_type, self._place, self._heard = fix_type, (latitude, longitude), at
@@ -65,7 +77,7 @@ class Fixes:
         if fix_type >= 3 and ellipsoid != 0 and separation != 0 and abs(separation) <= _LARGEST_SEPARATION_MM:
             self._ellipsoid_given = True
         self._separation_mm = separation
-        return fresh and fix_type >= 3
+        return fresh and bool(fix_type >= 3)
 
     def has_fix(self) -> bool:
         """Whether the last GPS_RAW_INT told of a fix that is alive; true as long as there is none to ask."""

@@ -36,9 +36,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-Reason = Literal[
-    "length", "magic", "version", "checksum", "kind", "radar", "tag", "replayed", "value", "duplicate"
-]
+Reason = Literal["length", "magic", "version", "checksum", "kind", "radar", "tag", "replayed", "value", "duplicate"]
 REASONS: tuple[Reason, ...] = (
     "length", "magic", "version", "checksum", "kind", "radar", "tag", "replayed", "value", "duplicate",
 )  # fmt: skip
@@ -201,7 +199,7 @@ def _tag(key: bytes, data: bytes) -> bytes:
 
 def _read_plot(data: bytes, at: int, time: int) -> Plot | None:
     (track, measured, offset_us, range_cm, azimuth, elevation, velocity, snr, *sigmas, _) = _PLOT.unpack_from(data, at)
-    if measured & 2 and abs(azimuth) > _HALF_TURN or measured & 4 and abs(elevation) > _QUARTER_TURN:
+    if (measured & 2 and abs(azimuth) > _HALF_TURN) or (measured & 4 and abs(elevation) > _QUARTER_TURN):
         return None
     return Plot(
         track,
@@ -222,7 +220,13 @@ def _read_status(data: bytes, at: int, _time: int) -> Status | None:
     if state >= len(STATES) or mode >= len(MODES):
         return None
     return Status(
-        STATES[state], MODES[mode], period_ms / 1000, latitude / 10**7, longitude / 10**7, height_mm / 1000, boresight / 10**7
+        STATES[state],
+        MODES[mode],
+        period_ms / 1000,
+        latitude / 10**7,
+        longitude / 10**7,
+        height_mm / 1000,
+        boresight / 10**7,
     )
 
 

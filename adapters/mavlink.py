@@ -168,7 +168,9 @@ class MavlinkObserver:
         if has_fix:
             self.notes.append(("info", f"{vehicle.name} has a GPS fix."))
         else:
-            self.notes.append(("warning", f"{vehicle.name} has lost its GPS fix: what it says of its position is not used."))
+            self.notes.append(
+                ("warning", f"{vehicle.name} has lost its GPS fix: what it says of its position is not used.")
+            )
 
     def _position(self, heard: _Heard) -> Observations:
         boot_ns = self._boot(heard, int.from_bytes(heard.payload[:4], "little"))

@@ -252,7 +252,9 @@ def message_name(number: int) -> str:
     return str(_MESSAGES[number].msgname) if number in _MESSAGES else str(number)
 
 
-def encode(name: str, values: dict[str, Any], *, system: int, component: int = 1, sequence: int = 0, version: int = 2) -> bytes:
+def encode(
+    name: str, values: dict[str, Any], *, system: int, component: int = 1, sequence: int = 0, version: int = 2
+) -> bytes:
     """The bytes of one frame, packed by pymavlink itself. `values` are its fields in the wire's units.
 
     Raises KeyError for an unknown message, TypeError for wrong field names, struct.error for values that do not fit.
@@ -278,5 +280,3 @@ class FrameEncoder:
         frame = encode(name, values, system=self.system, component=self.component, sequence=self.sequence)
         self.sequence = self.sequence + 1 & 255
         return frame
-
-

@@ -70,7 +70,9 @@ def _is_place(latitude_deg: float, longitude_deg: float) -> bool:
     return inside and (latitude_deg != 0.0 or longitude_deg != 0.0)
 
 
-def _point(sequence: int, command: int, frame: int, place_deg: tuple[float, float], altitude_m: float) -> PlanPoint | None:
+def _point(
+    sequence: int, command: int, frame: int, place_deg: tuple[float, float], altitude_m: float
+) -> PlanPoint | None:
     if frame not in (*_MSL_FRAMES, *_HOME_FRAMES, *_TERRAIN_FRAMES) or not _is_place(*place_deg):
         return None
     latitude_rad, longitude_rad = math.radians(place_deg[0]), math.radians(place_deg[1])

@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 
-from adapters.landing_radar import Datagram, Header, Plot, Reason, Record, Status, examine, records
+from adapters.landing_radar import Datagram, Header, Plot, Reason, Status, examine, records
 from gateway.observation import RadarPlot, RadarStatus, Timing
 
 WINDOW = 1024

@@ -151,7 +151,8 @@ class Registry:
             return None
         other = self._new(system, counters)
         there = ", ".join(self.origins[number] for number in sorted(alive[0].sources))
-        text = f"Two vehicles say that they are system {system}: {alive[0].name} on {there}, {other.name} on {self.origins[source]}."
+        text = f"Two vehicles say that they are system {system}: {alive[0].name} on {there}, "
+        text += f"{other.name} on {self.origins[source]}."
         self.notes.append(("warning", text))
         return other
 
