@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import rerun.blueprint as rrb
 
 from gateway.settings import Site
 from gateway.sinks.scene import style
+from gateway.sinks.scene.site import approach_reach_m
 
 
 def blueprint(site: Site) -> rrb.Blueprint:
@@ -18,7 +17,7 @@ def blueprint(site: Site) -> rrb.Blueprint:
             rrb.Vertical(
                 scene_view(site),
                 rrb.Horizontal(
-                    rrb.TextLogView(origin="/log", name="Log"),
+                    _log(),
                     rrb.StateTimelineView(origin="/fuse/state", name="Tracks"),
                 ),
                 row_shares=[4, 1],
@@ -55,18 +54,22 @@ def blueprint(site: Site) -> rrb.Blueprint:
 
 
 def scene_view(site: Site) -> rrb.Spatial3DView:
-    """The airfield and the approach: seen from beside and behind the far end of the runway, up the approach."""
-    slope = math.tan(site.runway.glide_path_rad)
+    """The airfield and the whole approach, from its right side: runway to the right, glide path rising to the left.
+
+    Nothing is stretched: heights are to scale with lengths, which is why the scene carries drop lines and
+    poles.
+    """
+    reach_m = approach_reach_m(site)
     return rrb.Spatial3DView(
         origin="/",
         name=f"{site.name}: approach",
         contents=["/site/**", "/raw/**", "/fuse/**", "/predict/**", "/truth/**", "/associate/**"],
         background=rrb.Background(color=(14, 17, 22)),
-        line_grid=rrb.LineGrid3D(visible=False),
+        line_grid=rrb.LineGrid3D(visible=True, spacing=0.1 * reach_m, color=(255, 255, 255, 14)),
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital,
-            position=(5000.0, -9000.0, 5000.0),
-            look_target=(-12000.0, 0.0, 12000.0 * slope),
+            position=(-0.12 * reach_m, -0.5 * reach_m, 0.22 * reach_m),
+            look_target=(-0.41 * reach_m, 0.0, 0.0),
             eye_up=(0.0, 0.0, 1.0),
         ),
     )
@@ -82,11 +85,19 @@ def map_view(site: Site) -> rrb.MapView:
     )
 
 
+def _log() -> rrb.TextLogView:
+    columns = rrb.TextLogColumns(
+        timeline_columns=[rrb.encodings.TimelineColumn("utc")],
+        text_log_columns=[rrb.encodings.TextLogColumn("LogLevel"), rrb.encodings.TextLogColumn("Body")],
+    )
+    return rrb.TextLogView(origin="/log", name="Log", columns=columns)
+
+
 def _plot(name: str, contents: list[str]) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         origin="/",
         name=name,
         contents=contents,
-        axis_x=rrb.TimeAxis(link="LinkToGlobal"),
+        axis_x=rrb.TimeAxis(link="Independent"),  # the whole approach, not the minute about the cursor
         plot_legend=rrb.PlotLegend(visible=True),
     )

@@ -16,6 +16,12 @@ from gateway.sinks.scene.entry import Always, entity
 Floats = NDArray[np.float64]
 
 
+def approach_reach_m(site: Site) -> float:
+    """How far out the approach is drawn: as far as the radars see, but at most 50 km; 20 km where there is none."""
+    ranges = [radar.maximum_range_m for radar in site.radars]
+    return min(max(ranges), 50_000.0) if ranges else 20_000.0
+
+
 class SiteScene:
     """Draws one site; lines go both into the 3D scene and onto the map, so that the map reads without tiles."""
 
@@ -85,18 +91,11 @@ class SiteScene:
             Always("/site/runway/surface", (surface,)),
             self.lines("/site/runway", [corners], style.RUNWAY, 1.5),
             Always("/site/runway/marks", (rr.LineStrips3D(marks, colors=style.RUNWAY, radii=style.points(0.8)),)),
-            self.labels("/site/name", np.array([[half, 0.0, 0.0]]), [self.site.name], style.TEXT, 0.5),
         ]
-
-    def _reach_m(self) -> float:
-        """How far out the approach is drawn: as far as the radars see, in whole ticks."""
-        ranges = [radar.maximum_range_m for radar in self.site.radars]
-        reach = min(max(ranges, default=0.0), 60_000.0) or 20_000.0
-        return reach
 
     def _centreline(self, runway: Runway) -> list[Always]:
         threshold, units = runway.threshold_x_m, self.units
-        reach = self._reach_m()
+        reach = approach_reach_m(self.site)
         tick_m = units.tick_m if reach >= 2.0 * units.tick_m else 0.2 * units.tick_m
         distances = np.arange(1, int(reach / tick_m) + 1) * tick_m
         strips = [np.array([[threshold - reach, 0.0, 0.0], [threshold, 0.0, 0.0]])]
@@ -115,7 +114,7 @@ class SiteScene:
     def _glide_path(self, runway: Runway) -> list[Always]:
         """The path in space, and every few kilometres a pole down to the ground, so that the eye sees its height."""
         aim, slope = runway.aiming_point_x_m, math.tan(runway.glide_path_rad)
-        top_m = min(1500.0, self._reach_m() * slope)
+        top_m = min(1500.0, approach_reach_m(self.site) * slope)
         poles = np.arange(1, 11) * 0.1 * top_m / slope
         path = np.array([[aim - top_m / slope, 0.0, top_m], [aim, 0.0, 0.0]])
         strips = [np.array([[aim - d, 0.0, 0.0], [aim - d, 0.0, d * slope]]) for d in poles]

@@ -91,9 +91,9 @@ class SourceScene:
         entries: list[Entry] = []
         if path not in self._trails:
             line = kind == "line"
-            self._trails[path] = Trail(path, "line" if line else "points", colour, 1.0 if line else 1.5)
+            self._trails[path] = Trail(path, "line" if line else "points", colour, 1.0 if line else 1.3)
             look = rr.Points3D.from_fields(colors=colour, radii=style.points(2.0 if line else 3.5))
-            ground = rr.GeoPoints.from_fields(colors=colour, radii=style.points(2.0 if line else 4.0))
+            ground = rr.GeoPoints.from_fields(colors=colour, radii=style.points(2.0 if line else 3.0))
             entries.append(Always(path, (look, ground)))
         here = rr.Points3D.columns(positions=place)
         entries.append(rows(path, time, step, here, rr.GeoPoints.columns(positions=lat_lon)))

@@ -31,6 +31,7 @@ STATES: dict[str, Colour] = {
     "coasting": (130, 130, 130),
     "ended": (60, 60, 60),
 }
+AXES: tuple[Colour, Colour, Colour] = ((235, 110, 90), (110, 200, 110), (110, 150, 240))  # as everywhere: x, y, z
 HORIZONTAL: Colour = (190, 120, 255)
 VERTICAL: Colour = (70, 200, 190)
 

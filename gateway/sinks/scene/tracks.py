@@ -99,7 +99,10 @@ class TrackScene:
             Always(f"{path}/symbol", (symbol,)),
             Always(
                 f"{path}/label",
-                (rr.Points3D.from_fields(colors=style.TEXT, radii=style.points(0.1), show_labels=True),),
+                (
+                    rr.Points3D.from_fields(colors=style.TEXT, radii=style.points(0.1), show_labels=True),
+                    rr.LineStrips3D.from_fields(colors=style.FUSED, radii=style.points(0.5)),
+                ),
             ),
             Always(
                 f"{path}/ellipsoid",
@@ -159,8 +162,11 @@ class TrackScene:
             texts.append(f"{who} {flown.state[row]}\n{altitude} {speed} {climb}")
         if not chosen:
             return []
-        block = rr.Points3D.columns(positions=flown.runway_m[chosen], labels=texts)
-        return [rows(f"{entity('fuse', flown.track)}/label", flown.time[chosen], flown.step[chosen], block)]
+        place = flown.runway_m[chosen]
+        block = rr.Points3D.columns(positions=place, labels=texts)
+        # a line down to the runway's plane: without it nobody sees how high, or over which point of the ground
+        drop = rr.LineStrips3D.columns(strips=list(np.stack([place, place * [1.0, 1.0, 0.0]], axis=1)))
+        return [rows(f"{entity('fuse', flown.track)}/label", flown.time[chosen], flown.step[chosen], block, drop)]
 
     def _plots(self, flown: Flown, drawn: _Drawn) -> list[Entry]:
         """Sigmas, mode probabilities and the error of the position source, where the estimator has them."""
@@ -186,7 +192,8 @@ class TrackScene:
             if kind not in drawn.named:
                 drawn.named.add(kind)
                 whose = aircraft if kind == "bias" else f"track {track}"
-                entries.append(Always(path, (rr.SeriesLines(names=[f"{whose} {name}{quantity}" for name in names]),)))
+                titles = [f"{whose} {name}{quantity}" for name in names]
+                entries.append(Always(path, (rr.SeriesLines(names=titles, colors=style.AXES[: len(names)]),)))
             plotted = rr.Scalars.columns(scalars=values[known])
             entries.append(rows(path, flown.time[known], flown.step[known], plotted))
         return entries

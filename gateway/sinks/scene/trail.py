@@ -31,6 +31,7 @@ class Trail:
     def __init__(self, path: str, kind: Literal["line", "points"], colour: style.Colour, size: float) -> None:
         self._path, self._kind = path, kind
         self._colour, self._radius = colour, style.points(size)
+        self._ground = style.points(0.4 * size if kind == "points" else size)  # a map is small: lines over dots
         self._segment = -1
         self._started = self._last_row = self._last = 0
         self._runway: list[Floats] = []
@@ -74,7 +75,7 @@ class Trail:
             ground = rr.GeoLineStrings.from_fields(colors=self._colour, radii=self._radius)
         else:
             look = rr.Points3D.from_fields(colors=self._colour, radii=self._radius)
-            ground = rr.GeoPoints.from_fields(colors=self._colour, radii=self._radius)
+            ground = rr.GeoPoints.from_fields(colors=self._colour, radii=self._ground)
         return [Always(self._place(), (look, ground))]
 
     def _place(self) -> str:
