@@ -6,7 +6,13 @@ import rerun.blueprint as rrb
 
 from gateway.settings import Site
 from gateway.sinks.scene import style
+from gateway.sinks.scene.scope import Scope
 from gateway.sinks.scene.site import approach_reach_m
+
+_RECENT = rrb.TimeRange(  # an approach lasts this long; left alone the viewer shows the minute about the cursor
+    start=rrb.TimeRangeBoundary.cursor_relative(seconds=-480),
+    end=rrb.TimeRangeBoundary.cursor_relative(seconds=30),
+)
 
 
 def blueprint(site: Site) -> rrb.Blueprint:
@@ -17,10 +23,11 @@ def blueprint(site: Site) -> rrb.Blueprint:
             rrb.Vertical(
                 scene_view(site),
                 rrb.Horizontal(
-                    _log(),
-                    rrb.StateTimelineView(origin="/fuse/state", name="Tracks"),
+                    scope_view(site),
+                    rrb.Tabs(_log(), rrb.StateTimelineView(origin="/fuse/state", name="Tracks")),
+                    column_shares=[3, 2],
                 ),
-                row_shares=[4, 1],
+                row_shares=[3, 2],
             ),
             rrb.Vertical(
                 map_view(site),
@@ -28,7 +35,7 @@ def blueprint(site: Site) -> rrb.Blueprint:
                     _plot("Approach, degrees off", ["/approach/angle/**"]),
                     _plot(
                         f"Approach, {units.length} off",
-                        ["/approach/**", "- /approach/angle/**", "- /approach/distance/**"],
+                        ["/approach/**", "- /approach/angle/**", "- /approach/distance/**", "- /approach/scope/**"],
                     ),
                     _plot(f"Distance to threshold, {units.distance}", ["/approach/distance/**"]),
                 ),
@@ -69,8 +76,24 @@ def scene_view(site: Site) -> rrb.Spatial3DView:
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital,
             position=(-0.12 * reach_m, -0.5 * reach_m, 0.22 * reach_m),
-            look_target=(-0.41 * reach_m, 0.0, 0.0),
+            look_target=(-0.38 * reach_m, 0.0, 0.0),
             eye_up=(0.0, 0.0, 1.0),
+        ),
+    )
+
+
+def scope_view(site: Site) -> rrb.Spatial2DView:
+    """The controller's screen; its dots stay for five minutes."""
+    x_range, y_range = Scope(site).bounds
+    return rrb.Spatial2DView(
+        origin="/approach/scope",
+        name="Precision approach: elevation over azimuth, x10",
+        background=rrb.Background(color=(14, 17, 22)),
+        visual_bounds=rrb.VisualBounds2D(x_range=x_range, y_range=y_range),
+        time_ranges=rrb.VisibleTimeRange(
+            "utc",
+            start=rrb.TimeRangeBoundary.cursor_relative(seconds=-300),
+            end=rrb.TimeRangeBoundary.cursor_relative(),
         ),
     )
 
@@ -87,7 +110,7 @@ def map_view(site: Site) -> rrb.MapView:
 
 def _log() -> rrb.TextLogView:
     columns = rrb.TextLogColumns(
-        timeline_columns=[rrb.encodings.TimelineColumn("utc")],
+        timeline_columns=[rrb.encodings.TimelineColumn("utc", visible=False)],  # too narrow to read: it is in the text
         text_log_columns=[rrb.encodings.TextLogColumn("LogLevel"), rrb.encodings.TextLogColumn("Body")],
     )
     return rrb.TextLogView(origin="/log", name="Log", columns=columns)
@@ -98,6 +121,6 @@ def _plot(name: str, contents: list[str]) -> rrb.TimeSeriesView:
         origin="/",
         name=name,
         contents=contents,
-        axis_x=rrb.TimeAxis(link="Independent"),  # the whole approach, not the minute about the cursor
+        axis_x=rrb.TimeAxis(view_range=_RECENT),
         plot_legend=rrb.PlotLegend(visible=True),
     )

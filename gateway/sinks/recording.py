@@ -12,7 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import rerun_cli
+import rerun_cli  # type: ignore[import-untyped]  # its command is used, not its code
 
 
 def optimise(path: Path) -> bool:

@@ -12,8 +12,9 @@ from gateway.sinks.feed import FileFeed, Identity, ServedFeed
 from gateway.sinks.scene.entry import Entry
 from gateway.sinks.scene.flown import Flights
 from gateway.sinks.scene.paths import ApproachScene, PredictScene
+from gateway.sinks.scene.scope import ScopeScene
 from gateway.sinks.scene.site import SiteScene
-from gateway.sinks.scene.sources import SourceScene
+from gateway.sinks.scene.sources import SourceScene, raw_positions
 from gateway.sinks.scene.stages import StageScene
 from gateway.sinks.scene.tracks import TrackScene
 
@@ -55,11 +56,12 @@ class RerunSink:
             raise
         self._flights, self._sources, self._tracks = Flights(site), SourceScene(site), TrackScene(site)
         self._approach, self._predict, self._stages = ApproachScene(site), PredictScene(site), StageScene(site)
+        self._scope = ScopeScene(site)
         self._period_ns, self._rows_limit = round(period_s * 1e9), rows_limit
         self._waiting: list[Picture] = []
         self._rows = 0
         self._drawn_at: int | None = None
-        self._send(list(SiteScene(site).entries()))
+        self._send([*SiteScene(site).entries(), *self._scope.site_entries()])
 
     @property
     def address(self) -> str | None:
@@ -101,9 +103,10 @@ class RerunSink:
         pictures, self._waiting, self._rows = self._waiting, [], 0
         if not pictures:
             return
-        flights = self._flights.gather(pictures)
+        heard, flights = raw_positions(pictures), self._flights.gather(pictures)
         entries: list[Entry] = [
-            *self._sources.entries(pictures),
+            *self._sources.entries(pictures, heard),
+            *self._scope.entries(heard, flights),
             *self._tracks.entries(flights),
             *self._approach.entries(flights),
             *self._predict.entries(pictures, flights),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import rerun as rr
@@ -27,6 +28,33 @@ def raw_path(source: str) -> str:
     return entity("raw", "radar", radar, number) if slash and radar.isdigit() else entity("raw", "gps", source)
 
 
+@dataclass(frozen=True, slots=True)
+class Positions:
+    """What one source said of places, in the order of time: an aircraft's own, or a radar track's plots."""
+
+    source: str
+    is_plot: bool
+    time: Ints  # (n,) ns
+    step: Ints  # (n,)
+    runway_m: Floats  # (n, 3)
+
+
+def raw_positions(pictures: Sequence[Picture]) -> list[Positions]:
+    """The raw positions of pictures, source by source; a plot without range or angle has no place in space."""
+    found = []
+    for is_plot in (False, True):
+        parts = [picture.align for picture in pictures]
+        time = np.concatenate([part.plot_time if is_plot else part.report_time for part in parts])
+        place = np.concatenate([part.plot_runway_m if is_plot else part.report_runway_m for part in parts])
+        named = [part.plot_radar_track if is_plot else part.report_aircraft for part in parts]
+        names = [name for part in named for name in part]
+        step = np.repeat([picture.step for picture in pictures], [len(part) for part in named])
+        for name, index in _by_name(names, np.asarray(np.isfinite(place).all(axis=1))):
+            index = index[in_order(time[index])]
+            found.append(Positions(name, is_plot, time[index], step[index], place[index]))
+    return found
+
+
 class SourceScene:
     """Draws raw positions and truth; remembers the trail of each."""
 
@@ -36,28 +64,13 @@ class SourceScene:
         self._trails: dict[str, Trail] = {}
         self._named: set[str] = set()
 
-    def entries(self, pictures: Sequence[Picture]) -> list[Entry]:
-        """The rows that these pictures add."""
-        return [*self._raw(pictures), *self._lateness(pictures), *self._truth(pictures)]
-
-    def _raw(self, pictures: Sequence[Picture]) -> list[Entry]:
-        names: list[str] = []
-        for picture in pictures:
-            names += picture.align.report_aircraft
-            names += picture.align.plot_radar_track
-        if not names:
-            return []
-        aligned = [picture.align for picture in pictures]
-        time = np.concatenate([part for one in aligned for part in (one.report_time, one.plot_time)])
-        place = np.concatenate([part for one in aligned for part in (one.report_runway_m, one.plot_runway_m)])
-        counts = [len(one.report_time) + len(one.plot_time) for one in aligned]
-        step = np.repeat([picture.step for picture in pictures], counts)
-        seen = np.asarray(np.isfinite(place).all(axis=1))  # a plot without range or angle has no place in space
+    def entries(self, pictures: Sequence[Picture], heard: Sequence[Positions]) -> list[Entry]:
+        """The rows that these pictures add; `heard` are their raw positions."""
         entries: list[Entry] = []
-        for name, index in _by_name(names, seen):
-            colour = style.RADAR if "raw/radar" in raw_path(name) else style.GPS
-            entries += self._positions(raw_path(name), colour, time[index], step[index], place[index], "points")
-        return entries
+        for one in heard:
+            colour = style.RADAR if one.is_plot else style.GPS
+            entries += self._positions(raw_path(one.source), colour, one.time, one.step, one.runway_m, "points")
+        return [*entries, *self._lateness(pictures), *self._truth(pictures)]
 
     def _truth(self, pictures: Sequence[Picture]) -> list[Entry]:
         told = [(truth, picture.step) for picture in pictures for truth in picture.truth]

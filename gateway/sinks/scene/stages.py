@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -18,6 +19,16 @@ from gateway.sinks.scene.sources import raw_path
 
 SAMPLE_NS = 1_000_000_000  # health and counts are read by people: once a second
 _LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
+
+
+class Sample(NamedTuple):
+    """One row of a plot."""
+
+    path: str
+    time: int
+    step: int
+    values: tuple[float, ...]
+    names: tuple[str, ...]
 
 
 class StageScene:
@@ -36,41 +47,54 @@ class StageScene:
             names |= {name for text in flown.radar_track if text for name in text.split()}
             self._sources.setdefault(flown.track, set()).update(names)
         entries: list[Entry] = []
+        samples: list[Sample] = []
         log: list[tuple[int, int, str, str]] = []
         for picture in pictures:
             log += [(event.at, picture.step, event.text, event.level) for event in picture.events]
-            entries += self._checks(picture)
+            samples += self._checks(picture)
             entries += self._joined(picture, log)
             if picture.now - self._sampled >= SAMPLE_NS:
                 self._sampled = picture.now
-                entries += self._sample(picture)
+                samples += self._sample(picture)
             entries += self._ended(picture, log)
+        entries += self._plotted(samples)
         if log:
             log.sort(key=lambda line: line[0])
             time, step, texts, levels = zip(*log, strict=True)
-            lines = rr.TextLog.columns(text=texts, level=[_LEVELS.get(level, "INFO") for level in levels])
+            clock = np.array(time, dtype="datetime64[ns]").astype("datetime64[s]").astype(str)
+            told = [f"{instant[11:]} {text}" for instant, text in zip(clock.tolist(), texts, strict=True)]
+            lines = rr.TextLog.columns(text=told, level=[_LEVELS.get(level, "INFO") for level in levels])
             entries.append(rows("/log", time, step, lines))
         return entries
 
-    def _plot(self, path: str, time: int, step: int, values: Sequence[float], names: Sequence[str]) -> Iterable[Entry]:
-        if path not in self._named:
-            self._named.add(path)
-            yield Always(path, (rr.SeriesLines(names=list(names)),))
-        yield once(path, time, step, rr.Scalars.columns(scalars=np.array([values], dtype=np.float64)))
-
-    def _checks(self, picture: Picture) -> list[Entry]:
-        """The association's counter, and each difference as a share of its gate: at 1 it is on the gate's edge."""
-        checked = picture.associate
+    def _plotted(self, samples: Sequence[Sample]) -> list[Entry]:
+        """Samples as rows, an entity at a time."""
+        found: dict[str, list[Sample]] = {}
+        for sample in samples:
+            found.setdefault(sample.path, []).append(sample)
         entries: list[Entry] = []
-        for row in range(len(checked.check_time)):
-            pair = f"{checked.check_aircraft[row]} = {checked.check_radar_track[row]}"
-            share = np.abs(checked.check_difference[row]) / checked.check_gate[row]
-            time, radar_track = int(checked.check_time[row]), checked.check_radar_track[row]
-            path = entity("associate", checked.check_aircraft[row], *radar_track.split("/"))
-            values = [float(checked.check_counter[row]), *share.tolist()]
-            names = [f"{pair} {what}" for what in ("counter", "range / gate", "azimuth / gate", "elevation / gate")]
-            entries += self._plot(path, time, picture.step, values, names)
+        for path, mine in found.items():
+            if path not in self._named:
+                self._named.add(path)
+                entries.append(Always(path, (rr.SeriesLines(names=mine[0].names),)))
+            mine.sort(key=lambda sample: sample.time)
+            values = rr.Scalars.columns(scalars=np.array([sample.values for sample in mine], dtype=np.float64))
+            time, step = [sample.time for sample in mine], [sample.step for sample in mine]
+            entries.append(rows(path, time, step, values))
         return entries
+
+    def _checks(self, picture: Picture) -> list[Sample]:
+        """The association's counter, and each difference as a share of its gate: at 1 it is on the gate's edge."""
+        checked, samples = picture.associate, []
+        shares = np.abs(checked.check_difference) / checked.check_gate if len(checked.check_time) else np.empty((0, 3))
+        for row, aircraft in enumerate(checked.check_aircraft):
+            radar_track = checked.check_radar_track[row]
+            path = entity("associate", aircraft, *radar_track.split("/"))
+            values = (float(checked.check_counter[row]), *shares[row].tolist())
+            whats = ("counter", "range / gate", "azimuth / gate", "elevation / gate")
+            names = tuple(f"{aircraft} = {radar_track} {what}" for what in whats)
+            samples.append(Sample(path, int(checked.check_time[row]), picture.step, values, names))
+        return samples
 
     def _joined(self, picture: Picture, log: list[tuple[int, int, str, str]]) -> list[Entry]:
         """The point of association: where a radar track and an aircraft became one, or stopped being one."""
@@ -88,29 +112,23 @@ class StageScene:
             entries.append(once(path, change.at, picture.step, mark))
         return entries
 
-    def _sample(self, picture: Picture) -> list[Entry]:
-        now, step = picture.now, picture.step
-        entries: list[Entry] = []
-        counts = [float(len(picture.track.active)), float(picture.track.untracked)]
-        entries += self._plot("/track", now, step, counts, ("radar tracks", "plots of no track"))
-        pairs = [float(len(picture.associate.pairs))]
-        entries += self._plot("/associate", now, step, pairs, ("pairs",))
-        for radar, (range_m, azimuth_rad, elevation_rad) in zip(
-            picture.register.radars, picture.register.correction, strict=True
-        ):
-            length = [range_m * self._units.lengths]
-            angles = [math.degrees(azimuth_rad), math.degrees(elevation_rad)]
-            name = f"radar {radar}"
-            path = entity("register", "radar", radar, "range")
-            entries += self._plot(path, now, step, length, (f"{name} range error, {self._units.length}",))
-            path = entity("register", "angle", radar)
-            names = (f"{name} azimuth error, degrees", f"{name} elevation error, degrees")
-            entries += self._plot(path, now, step, angles, names)
+    def _sample(self, picture: Picture) -> list[Sample]:
+        """Counts, corrections and health at this instant."""
+        told: list[tuple[str, tuple[float, ...], tuple[str, ...]]] = []
+        counts = (float(len(picture.track.active)), float(picture.track.untracked))
+        told.append(("/track", counts, ("radar tracks", "plots of no track")))
+        told.append(("/associate", (float(len(picture.associate.pairs)),), ("pairs",)))
+        registered = picture.register
+        for radar, (range_m, azimuth, elevation) in zip(registered.radars, registered.correction.tolist(), strict=True):
+            title, length = f"radar {radar} range error, {self._units.length}", range_m * self._units.lengths
+            told.append((entity("register", "radar", radar), (length,), (title,)))
+            both = (f"radar {radar} azimuth error, degrees", f"radar {radar} elevation error, degrees")
+            told.append((entity("register", "angle", radar), (math.degrees(azimuth), math.degrees(elevation)), both))
         for source in picture.health.sources:
-            values = [source.age_s, source.rate_hz, float(source.lost)]
-            heard = [f"{source.name} {what}" for what in ("last heard, s ago", "rate, 1/s", "lost")]
-            entries += self._plot(entity("health", source.name), now, step, values, heard)
-        return entries
+            name = source.name
+            titles = (f"{name} last heard, s ago", f"{name} rate, 1/s", f"{name} lost")
+            told.append((entity("health", name), (source.age_s, source.rate_hz, float(source.lost)), titles))
+        return [Sample(path, picture.now, picture.step, values, names) for path, values, names in told]
 
     def _ended(self, picture: Picture, log: list[tuple[int, int, str, str]]) -> list[Entry]:
         """A track that ended leaves the scene, with what its sources said, and the log says so."""

@@ -1,0 +1,169 @@
+"""The controller's screen: elevation above, azimuth below, over the distance to the point where the glide path ends.
+
+This is a diagram: heights and offsets are drawn ten times as large as distances, which is what lines of constant
+deviation need to be seen apart. True proportions are in the 3D scene, true numbers in the plots.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from gateway.settings import Runway, Site
+from gateway.sinks.scene import style
+from gateway.sinks.scene.entry import Always, Entry, entity, rows
+from gateway.sinks.scene.flown import Flown
+from gateway.sinks.scene.site import approach_reach_m
+from gateway.sinks.scene.sources import Positions, raw_path
+
+Floats = NDArray[np.float64]
+
+STRETCH = 10.0
+ROOT = "/approach/scope"
+
+
+class Scope:
+    """Where things stand on the screen, for one site: x along the approach, y down, in metres of distance."""
+
+    def __init__(self, site: Site) -> None:
+        self._runway: Runway = site.runway
+        self.reach_m = approach_reach_m(site)
+        self.top_m = 0.03 * self.reach_m  # heights and offsets that are shown; beyond them nothing is drawn
+        self.side_m = 0.012 * self.reach_m
+        self._ground_y = -STRETCH * 0.25 * self.side_m
+        self._middle_y = STRETCH * 1.25 * self.side_m
+
+    @property
+    def bounds(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """What the view shows: ranges of x and y."""
+        lowest = self._middle_y + STRETCH * 1.1 * self.side_m
+        highest = self._ground_y - STRETCH * 1.05 * self.top_m
+        return (-1.04 * self.reach_m, 0.06 * self.reach_m), (highest, lowest)
+
+    def elevation(self, along_m: Floats, height_m: Floats) -> Floats:
+        """Screen positions (n, 2) in the upper diagram; NaN for what is too high or low for it."""
+        shown = (height_m >= -0.02 * self.top_m) & (height_m <= self.top_m) & (along_m > -self.reach_m)
+        y = np.where(shown, self._ground_y - STRETCH * height_m, np.nan)
+        return np.stack([along_m, y], axis=-1)
+
+    def azimuth(self, along_m: Floats, left_m: Floats) -> Floats:
+        """Screen positions (n, 2) in the lower diagram, left of the centreline up; NaN for what is too far aside."""
+        shown = (np.abs(left_m) <= self.side_m) & (along_m > -self.reach_m)
+        y = np.where(shown, self._middle_y - STRETCH * left_m, np.nan)
+        return np.stack([along_m, y], axis=-1)
+
+    def both(self, runway_m: Floats) -> Floats:
+        """Screen positions (n, 2, 2) of runway-frame positions (n, 3): elevation, azimuth."""
+        along = runway_m[:, 0] - self._runway.aiming_point_x_m
+        return np.stack([self.elevation(along, runway_m[:, 2]), self.azimuth(along, runway_m[:, 1])], axis=1)
+
+
+class ScopeScene:
+    """Draws the screen of one site, and everything that is on the approach."""
+
+    def __init__(self, site: Site) -> None:
+        self._site, self._units, self.scope = site, style.units_of(site), Scope(site)
+        self._looked: set[str] = set()
+
+    def entries(self, heard: Sequence[Positions], flights: Sequence[Flown]) -> list[Entry]:
+        """The rows of raw positions and of tracks."""
+        entries: list[Entry] = []
+        for one in heard:
+            colour, size = (style.RADAR, 1.0) if one.is_plot else (style.GPS, 2.0)
+            path = ROOT + raw_path(one.source).removeprefix("/raw")
+            entries += self._dots(path, colour, size, one.time, one.step, one.runway_m)
+        for flown in flights:
+            path = entity("approach", "scope", flown.track)
+            entries += self._dots(path, style.FUSED, 1.2, flown.time, flown.step, flown.runway_m)
+        return entries
+
+    def _dots(
+        self,
+        path: str,
+        colour: style.Colour,
+        size: float,
+        time: NDArray[np.int64],
+        step: NDArray[np.int64],
+        place: Floats,
+    ) -> list[Entry]:
+        spots = self.scope.both(place)
+        shown = np.asarray(np.isfinite(spots).all(axis=-1))
+        known = np.asarray(shown.any(axis=1))
+        if not known.any():
+            return []
+        entries: list[Entry] = []
+        if path not in self._looked:
+            self._looked.add(path)
+            look = rr.Points2D.from_fields(
+                colors=colour, radii=style.points(size), draw_order=31.0 if colour == style.FUSED else 30.0
+            )
+            entries.append(Always(path, (look,)))
+        dots = rr.Points2D.columns(positions=spots[shown]).partition(shown[known].sum(axis=1))
+        return [*entries, rows(path, time[known], step[known], dots)]
+
+    def site_entries(self) -> list[Always]:
+        """The lines of the screen: what stands still."""
+        scope, runway = self.scope, self._site.runway
+        slope, reach = math.tan(runway.glide_path_rad), scope.reach_m
+        ground = np.array([[-reach, 0.0], [0.05 * reach, 0.0]])
+        half = math.radians(0.5)
+        thin: list[Floats] = []
+        wide: list[Floats] = []
+        for angle in (-half, 0.0, half):
+            steep = math.tan(runway.glide_path_rad + angle)
+            far = min(reach, scope.top_m / steep)
+            line = scope.elevation(np.array([-far, 0.0]), np.array([far * steep * 0.999, 0.0]))
+            (wide if angle == 0.0 else thin).append(line)
+            aside = math.tan(2.0 * angle)
+            out = min(reach, scope.side_m / abs(aside)) if aside else reach
+            line = scope.azimuth(np.array([-0.999 * out, 0.0]), np.array([0.999 * out * aside, 0.0]))
+            (wide if angle == 0.0 else thin).append(line)
+        strip = np.array([runway.threshold_x_m, -runway.threshold_x_m]) - runway.aiming_point_x_m
+        zero = np.zeros(2)
+        hard = [scope.elevation(strip, zero), scope.azimuth(strip, zero)]
+        frame = [scope.elevation(ground[:, 0] * 0.999, zero)]
+        texts, places = self._marks(frame)
+        decisions = [
+            point.distance_m + (runway.aiming_point_x_m - runway.threshold_x_m) for point in self._site.decision_points
+        ]
+        spots = np.array([[[-d, 0.0, d * slope]] for d in decisions]).reshape(-1, 3)
+        spots[:, 0] += runway.aiming_point_x_m
+        return [
+            Always(f"{ROOT}/lines/frame", (_lines(frame, (60, 66, 74), 0.4),)),
+            Always(f"{ROOT}/lines/limits", (_lines(thin, style.CENTRELINE, 0.4),)),
+            Always(f"{ROOT}/lines/path", (_lines(wide, style.GLIDE_PATH, 0.8),)),
+            Always(f"{ROOT}/lines/runway", (_lines(hard, style.RUNWAY, 2.0),)),
+            Always(
+                f"{ROOT}/lines/marks",
+                (
+                    rr.Points2D(
+                        places, labels=texts, show_labels=True, colors=style.CENTRELINE, radii=style.points(0.1)
+                    ),
+                ),
+            ),
+            Always(
+                f"{ROOT}/lines/decision",
+                (rr.Points2D(scope.both(spots).reshape(-1, 2), colors=style.DECISION, radii=style.points(3.0)),),
+            ),
+        ]
+
+    def _marks(self, frame: list[Floats]) -> tuple[list[str], Floats]:
+        """Adds a line at each distance to `frame`; returns the labels and where they stand."""
+        scope, units = self.scope, self._units
+        tick_m = units.tick_m if scope.reach_m >= 2.0 * units.tick_m else 0.2 * units.tick_m
+        texts, places = [], []
+        for distance in np.arange(1, int(scope.reach_m / tick_m) + 1) * tick_m * 0.9999:
+            along = np.array([-distance, -distance])
+            frame.append(scope.elevation(along, np.array([0.0, scope.top_m])))
+            frame.append(scope.azimuth(along, np.array([-scope.side_m, scope.side_m])))
+            texts.append(f"{distance * units.distances:.0f} {units.distance}")
+            places.append(scope.elevation(along[:1], np.zeros(1))[0])
+        return texts, np.array(places).reshape(-1, 2)
+
+
+def _lines(strips: list[Floats], colour: style.Colour, width: float) -> rr.LineStrips2D:
+    return rr.LineStrips2D(strips, colors=colour, radii=style.points(width))
