@@ -28,6 +28,7 @@ _TRUTH_HOLD_S, _REPORT_HOLD_S = 2.0, 6.0  # so long a silent aircraft is still t
 _TRUTH_LOST_S = 10.0  # then its reports are believed again
 _JUMP_NS = 60 * SECOND_NS  # a step of the aircraft's clock beyond this begins anew
 _STAMP_STEP_NS = 4_000
+_LEAST_STEP_NS = 5_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +50,8 @@ class _Watched:
     places: list[_Place] = field(default_factory=list)
 
     def take(self, place: _Place) -> None:
-        """Take a place in that is newer than all; old ones are forgotten."""
-        if self.places and place.at <= self.places[-1].at:
+        """Take a place in that is newer than all, by enough to tell a movement; old ones are forgotten."""
+        if self.places and place.at < self.places[-1].at + _LEAST_STEP_NS:
             return
         self.places.append(place)
         if len(self.places) > 64:

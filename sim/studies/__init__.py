@@ -1,0 +1,34 @@
+"""The papers' experiments: each module has `run(runs, seed, ...)`, which returns tables, and draws its figures into an .rrd."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+Progress = Callable[[str, float], None]  # what is being done, and the share of the whole that is done
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """One table of a study: a title, the columns' headings with their units, and rows of texts and numbers."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str | float, ...], ...]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """What a study found: its tables, the same figures by name, and where its drawings are."""
+
+    name: str
+    runs: int
+    seed: int
+    tables: tuple[Table, ...]
+    figures: dict[str, float] = field(default_factory=dict)
+    recording: str | None = None
+
+
+def silent(what: str, share: float) -> None:
+    """No progress shown."""
