@@ -269,7 +269,7 @@ def _rebuilt(lanes: Lanes, lane: Lane, at: int, scene: Scene) -> tuple[Lanes, Jo
         if lane.whole:
             keep = 0
         plots = _free_plots(lane, scene)
-        measures = [*_begin(plots)] if not keep else [p for p in plots if p.at >= at]
+        measures = [*begin(plots)] if not keep else [p for p in plots if p.at >= at]
     lane = replace(lane, events=lane.events[:keep])
     lanes = lanes.with_lane(lane)
     base = lane.events[-1] if keep else None
@@ -281,7 +281,7 @@ def _rebuilt(lanes: Lanes, lane: Lane, at: int, scene: Scene) -> tuple[Lanes, Jo
 
 def _begun_from_plots(lanes: Lanes, key: Key, ordinal: int, scene: Scene) -> tuple[Lanes, Job | None]:
     """A new lane for a radar track that nobody claims, once its plots allow to start one."""
-    measures = _begin(_free_plots(Lane(0, None, key, ordinal), scene))
+    measures = begin(_free_plots(Lane(0, None, key, ordinal), scene))
     if not measures:
         return lanes, None
     lanes, lane = lanes.begun(None, key, ordinal)
@@ -311,7 +311,7 @@ def _free_plots(lane: Lane, scene: Scene) -> list[Plot]:
     ]
 
 
-def _begin(plots: Sequence[Plot]) -> list[Measure]:
+def begin(plots: Sequence[Plot]) -> list[Measure]:
     """The measurements of a radar track from the first one that can start a state: complete, or completed by neighbours."""
     for place in range(LEAST_PLOTS - 1, len(plots)):
         plot = plots[place]
