@@ -20,7 +20,7 @@ from typing import Literal
 
 from adapters import Arrival, Source
 from adapters.mavlink_frames import V1, V2, FrameScanner, parse
-from adapters.pcap import Captured, CaptureReader, is_capture
+from adapters.pcap import Captured, PcapReader, is_capture
 from adapters.tlog import STEP_NS, TlogReader, record_end
 
 Kind = Literal["tlog", "pcap", "pcapng", "BIN", "ulg", "session"]
@@ -116,7 +116,7 @@ class Recording:
             self.sources = (Source(self.first_number, "mavlink", name, str(self.path)),)
             return
         with self.path.open("rb") as file:
-            senders = _senders(CaptureReader(file))
+            senders = _senders(PcapReader(file))
         number, sources = self.first_number, []
         if "" in senders:
             sources.append(Source(number, "radar", f"{name}-radar" if len(senders) > 1 else name, str(self.path)))
@@ -141,13 +141,13 @@ class Recording:
                     found = True
                     yield Arrival(stamp, self.first_number, frame)
             else:
-                for arrival in self._captured(CaptureReader(file, self.counters)):
+                for arrival in self._captured(PcapReader(file, self.counters)):
                     found = True
                     yield arrival
         if not found:
             raise FileError(f"{self.path} holds no whole MAVLink frame and no radar datagram.")
 
-    def _captured(self, reader: CaptureReader) -> Iterator[Arrival]:
+    def _captured(self, reader: PcapReader) -> Iterator[Arrival]:
         scanners: dict[str, FrameScanner] = {}
         last = -1
         for captured in reader:
@@ -172,7 +172,7 @@ class Recording:
         return len(self.sources) == 1 and self.sources[0].kind == "radar"
 
 
-def _senders(reader: CaptureReader) -> list[str]:
+def _senders(reader: PcapReader) -> list[str]:
     """Who sends what: "" stands for the radar link, else a MAVLink sender's address; in order of appearance."""
     found: dict[str, None] = {}
     for index, captured in enumerate(reader):
@@ -202,3 +202,13 @@ def open_recording(path: Path, first_number: int = 0) -> Recording:
     if kind not in ("tlog", "pcap", "pcapng"):
         raise FileError(f"{path} is a {kind} file: it is not read as a recording of arrivals.")
     return Recording(path, kind, first_number)
+
+
+def last_stamp(path: Path) -> int | None:
+    """The stamp of the last whole record of a .tlog or capture; None where there is none."""
+    with path.open("rb") as file:
+        beginning = file.read(4)
+        file.seek(0)
+        if is_capture(beginning):
+            return max((captured.received_at for captured in PcapReader(file)), default=None)
+        return max((stamp for stamp, _ in TlogReader(file)), default=None)

@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 from adapters.clock import SECOND, SessionEpoch
 from adapters.fixes import GLOBAL_POSITION_INT, GPS_RAW_INT
 from adapters.mavlink_frames import Frame, fields
+from adapters.plans import MISSION_MESSAGES, overheard
 from adapters.vehicles import INVALID_AUTOPILOT, STATIONS, Component, Registry, Vehicle
 from gateway.observation import Attitude, FlightPlan, Observation, Timing, Truth, VehicleStatus
 
@@ -31,17 +32,12 @@ ATTITUDE, _read_attitude = fields("ATTITUDE", "time_boot_ms", "roll", "pitch", "
 SIM_STATE, _read_sim_state = fields("SIM_STATE", "lat_int", "lon_int", "lat", "lon", "alt", "vn", "ve", "vd")
 SIMSTATE, _read_simstate = fields("SIMSTATE", "lat", "lng")
 HOME_POSITION, _read_home = fields("HOME_POSITION", "latitude", "longitude", "altitude")
-MISSION_COUNT, _read_count = fields("MISSION_COUNT", "count", "target_system", "mission_type")
-_ITEM = ("seq", "command", "frame", "x", "y", "z", "target_system", "mission_type")
-MISSION_ITEM, _read_item = fields("MISSION_ITEM", *_ITEM)
-MISSION_ITEM_INT, _read_item_int = fields("MISSION_ITEM_INT", *_ITEM)
 
 _ARMED = 128
 _NO_POSITION_NS = 10 * SECOND
 _FIX_NOTES = 6  # a fix that comes and goes is told so often and no more
 _DEGE7 = math.pi / 180.0 / 1e7
 _BOOT_MS = {ATTITUDE: slice(0, 4), GLOBAL_POSITION_INT: slice(0, 4)}
-_MISSION = (MISSION_COUNT, MISSION_ITEM, MISSION_ITEM_INT)
 
 Observations = tuple[Observation, ...]
 
@@ -79,7 +75,7 @@ class MavlinkObserver:
         component.sequence.hear(frame.sequence, message, counters)
         if frame.verdict != "good":
             return ()
-        if message in _MISSION:
+        if message in MISSION_MESSAGES:
             return self._mission(component, frame, received_at)
         reader = self._readers.get(message)
         if reader is None:
@@ -232,20 +228,11 @@ class MavlinkObserver:
 
     def _mission(self, component: Component, frame: Frame, received_at: int) -> Observations:
         """Mission traffic: of the vehicle that tells its items, or of the one that a station tells them to."""
-        source, message, payload = component.key[0], frame.message, frame.payload
-        if message == MISSION_COUNT:
-            count, target, mission = _read_count(payload)
-        else:
-            read = _read_item_int if message == MISSION_ITEM_INT else _read_item
-            sequence, command, item_frame, x, y, altitude, target, mission = read(payload)
-        vehicle = self.registry.of_number(source, frame.system if component.is_vehicle else target)
-        if mission != 0 or vehicle is None:
-            return ()
-        if message == MISSION_COUNT:
-            vehicle.plan.begin(count)
-            return ()
-        place = (x / 1e7, y / 1e7) if message == MISSION_ITEM_INT else (x, y)
-        if not vehicle.plan.hear_item(sequence, command, item_frame, place, altitude):
+        told = overheard(frame.message, frame.payload)
+        vehicle = self.registry.of_number(
+            component.key[0], frame.system if component.is_vehicle else told.target_system
+        )
+        if not told.is_flight_plan or vehicle is None or not vehicle.plan.hear(told):
             return ()
         if component.is_vehicle and component.clock.has_been_heard():
             valid_at, _ = self._time(component, component.clock.boot_at(received_at), received_at)

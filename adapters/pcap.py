@@ -51,7 +51,7 @@ def is_capture(beginning: bytes) -> bool:
 
 
 @dataclass(slots=True)
-class CaptureReader:
+class PcapReader:
     """The UDP datagrams of a .pcap or .pcapng, in the file's order.
 
     Counters: "not UDP", "cut by the capture", "fragments", "unknown link type", "cut at the end".

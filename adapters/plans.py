@@ -8,11 +8,43 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from adapters.mavlink_frames import fields
 from gateway.observation import PlanPoint
+
+_ITEM = ("seq", "command", "frame", "x", "y", "z", "target_system", "mission_type")
+MISSION_COUNT, _read_count = fields("MISSION_COUNT", "count", "target_system", "mission_type")
+MISSION_ITEM, _read_item = fields("MISSION_ITEM", *_ITEM)
+MISSION_ITEM_INT, _read_item_int = fields("MISSION_ITEM_INT", *_ITEM)
+MISSION_MESSAGES = frozenset((MISSION_COUNT, MISSION_ITEM, MISSION_ITEM_INT))
 
 _KINDS = {16: "waypoint", 82: "waypoint", 22: "take-off", 84: "take-off", 24: "take-off", 21: "landing", 85: "landing"}
 _KINDS |= dict.fromkeys((17, 18, 19, 31), "loiter")
 _MSL_FRAMES, _HOME_FRAMES, _TERRAIN_FRAMES = (0, 5), (3, 6), (10, 11)
+
+
+@dataclass(frozen=True, slots=True)
+class Overheard:
+    """One message of a mission transfer: how many items are to come, or one of them."""
+
+    target_system: int
+    is_flight_plan: bool  # and no fence or rally points
+    count: int | None = None
+    sequence: int = 0
+    command: int = 0
+    frame: int = 0
+    place_deg: tuple[float, float] = (0.0, 0.0)
+    altitude_m: float = math.nan
+
+
+def overheard(message: int, payload: bytes) -> Overheard:
+    """What one of `MISSION_MESSAGES` says."""
+    if message == MISSION_COUNT:
+        count, target, mission = _read_count(payload)
+        return Overheard(target, mission == 0, count)
+    read = _read_item_int if message == MISSION_ITEM_INT else _read_item
+    sequence, command, frame, x, y, altitude_m, target, mission = read(payload)
+    place_deg = (x / 1e7, y / 1e7) if message == MISSION_ITEM_INT else (x, y)
+    return Overheard(target, mission == 0, None, sequence, command, frame, place_deg, altitude_m)
 
 
 @dataclass(slots=True)
@@ -24,26 +56,14 @@ class PlanBook:
     _heard: set[int] = field(default_factory=set)
     _expected: int | None = None
 
-    def begin(self, count: int) -> None:
-        """A transfer of so many items begins (MISSION_COUNT)."""
-        self._expected = count
-        self._heard.clear()
-
-    def hear_home(self, latitude_deg: float, longitude_deg: float, altitude_msl_m: float) -> bool:
-        """The vehicle's home; whether the plan has changed."""
-        home = PlanPoint(
-            0, "home", math.radians(latitude_deg), math.radians(longitude_deg), altitude_msl_m=altitude_msl_m
-        )
-        if not _is_place(latitude_deg, longitude_deg) or home == self._home:
+    def hear(self, told: Overheard) -> bool:
+        """One message of a transfer; whether the plan has changed and is whole (as far as its length is known)."""
+        if told.count is not None:
+            self._expected = told.count
+            self._heard.clear()
             return False
-        self._home = home
-        return True
-
-    def hear_item(
-        self, sequence: int, command: int, frame: int, place_deg: tuple[float, float], altitude_m: float
-    ) -> bool:
-        """One mission item; whether the plan has changed and is whole (as far as its length is known)."""
-        point = None if sequence == 0 else _point(sequence, command, frame, place_deg, altitude_m)  # 0 is home's copy
+        sequence = told.sequence
+        point = None if sequence == 0 else _point(told)  # 0 is a copy of home
         known = self._points.get(sequence)
         first = sequence not in self._heard
         if point is None:
@@ -59,6 +79,16 @@ class PlanBook:
                 del self._points[surplus]
         return whole and (first or point != known)
 
+    def hear_home(self, latitude_deg: float, longitude_deg: float, altitude_msl_m: float) -> bool:
+        """The vehicle's home; whether the plan has changed."""
+        home = PlanPoint(
+            0, "home", math.radians(latitude_deg), math.radians(longitude_deg), altitude_msl_m=altitude_msl_m
+        )
+        if not _is_place(latitude_deg, longitude_deg) or home == self._home:
+            return False
+        self._home = home
+        return True
+
     def points(self) -> tuple[PlanPoint, ...]:
         """The plan, home first, in the order of the sequence numbers."""
         home = () if self._home is None else (self._home,)
@@ -70,18 +100,15 @@ def _is_place(latitude_deg: float, longitude_deg: float) -> bool:
     return inside and (latitude_deg != 0.0 or longitude_deg != 0.0)
 
 
-def _point(
-    sequence: int, command: int, frame: int, place_deg: tuple[float, float], altitude_m: float
-) -> PlanPoint | None:
-    if frame not in (*_MSL_FRAMES, *_HOME_FRAMES, *_TERRAIN_FRAMES) or not _is_place(*place_deg):
+def _point(told: Overheard) -> PlanPoint | None:
+    if told.frame not in (*_MSL_FRAMES, *_HOME_FRAMES, *_TERRAIN_FRAMES) or not _is_place(*told.place_deg):
         return None
-    latitude_rad, longitude_rad = math.radians(place_deg[0]), math.radians(place_deg[1])
-    given = math.isfinite(altitude_m)
+    altitude_m = told.altitude_m if math.isfinite(told.altitude_m) else None
     return PlanPoint(
-        sequence,
-        _KINDS.get(command, "other"),
-        latitude_rad,
-        longitude_rad,
-        altitude_msl_m=altitude_m if given and frame in _MSL_FRAMES else None,
-        altitude_above_home_m=altitude_m if given and frame in _HOME_FRAMES else None,
+        told.sequence,
+        _KINDS.get(told.command, "other"),
+        math.radians(told.place_deg[0]),
+        math.radians(told.place_deg[1]),
+        altitude_msl_m=altitude_m if told.frame in _MSL_FRAMES else None,
+        altitude_above_home_m=altitude_m if told.frame in _HOME_FRAMES else None,
     )

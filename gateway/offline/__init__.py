@@ -1,0 +1,1 @@
+"""Works on what was archived or recorded; takes and returns values."""
