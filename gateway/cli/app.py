@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
-from typing import Annotated
+from typing import Annotated, cast
 
 import typer
 
@@ -24,7 +24,8 @@ app = typer.Typer(
 for command in (demo, live, replay, simulate, play, site, study, sessions):
     command.register(app)
 
-_WRONG_USAGE = typer.BadParameter.__bases__[0]  # click's UsageError, wherever this version of typer keeps its click
+# click's UsageError, wherever this version of typer keeps its click
+_WRONG_USAGE = cast("type[Exception]", typer.BadParameter.__bases__[0])
 
 
 @app.callback()

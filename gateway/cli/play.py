@@ -41,8 +41,9 @@ def play(
     quiet: take.QuietOption = False,
 ) -> None:
     """Send a recording onto the wires."""
+    from adapters.files import FileError
     from gateway.runtime.folder import FolderError
-    from gateway.runtime.playback import RecordingError, open_playback
+    from gateway.runtime.playback import open_playback
     from gateway.runtime.player import play_onto
     from gateway.runtime.signals import StopSignals
     from gateway.runtime.urls import MAVLINK_PORT, RADAR_PORT, LinkError
@@ -57,7 +58,7 @@ def play(
         playback = open_playback(files)
         with StopSignals() as stop:
             sent = play_onto(playback, mavlink_url, radar_url, speed=pace, asked_to_stop=stop)
-    except (RecordingError, FolderError, LinkError) as error:
+    except (FileError, FolderError, LinkError) as error:
         raise UsageError(str(error)) from error
     except OSError as error:
         raise RunError(f"Sending failed: {(error.strerror or str(error)).lower()}.") from error

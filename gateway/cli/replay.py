@@ -83,11 +83,12 @@ def replay(
     json: take.JsonOption = False,
 ) -> None:
     """Run recordings again."""
+    from adapters.files import FileError
     from gateway.cli.display import Display
     from gateway.cli.viewing import Viewing, chosen
     from gateway.runtime.folder import FolderError
     from gateway.runtime.loop import run_replay
-    from gateway.runtime.playback import RecordingError, open_playback
+    from gateway.runtime.playback import open_playback
     from gateway.runtime.setup import RunFailure, Setup
     from gateway.runtime.signals import StopSignals
 
@@ -110,11 +111,9 @@ def replay(
             Viewing(looks) as viewing,
             Display(viewing, quiet=quiet, as_json=json, fraction=playback.fraction) as display,
         ):
-            for note in playback.notes:
-                display.say(note)
             summary = run_replay(playback, setup, speed=pace, watch=display.watch, asked_to_stop=stop)
         display.show(summary)
-    except (RecordingError, FolderError) as error:
+    except (FileError, FolderError) as error:
         raise UsageError(str(error)) from error
     except RunFailure as failure:
         raise RunError(str(failure)) from failure

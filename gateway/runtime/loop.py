@@ -5,11 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
-from gateway.runtime.playback import Playback
-
 from adapters import Arrival
 from gateway.picture import Picture
 from gateway.runtime.links import Link
+from gateway.runtime.playback import Playback
 from gateway.runtime.receiver import Receiver
 from gateway.runtime.run import Run
 from gateway.runtime.setup import RunFailure, Setup
@@ -119,6 +118,7 @@ def run_replay(
             if asker := asked_to_stop():
                 ended = f"stopped by {asker}"
                 break
+            run.count(playback.counters())
             watch(run, run.work(arrivals, watermark))
         else:
             if playback.watermark is not None:

@@ -7,9 +7,8 @@ import time
 from collections import Counter
 from collections.abc import Callable
 
-from gateway.runtime.playback import Playback
-
 from gateway.runtime.links import resolve
+from gateway.runtime.playback import Playback
 from gateway.runtime.urls import Url
 
 _SLEEP_AT_MOST_S = 0.1  # so that a request to stop is heard

@@ -8,10 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from adapters import Arrival, Source
 from adapters.pcap import PcapWriter
 from adapters.tlog import TlogWriter
-
-from adapters import Arrival, Source
 from gateway.runtime.folder import INPUTS, InputFile, Record, write_record
 from gateway.runtime.hold import Hold
 from gateway.runtime.wholefile import WholeFile
@@ -34,14 +33,14 @@ class _Input:
         self._refusals = 0
 
     def write(self, arrival: Arrival) -> None:
-        self._writer.write(arrival.received_at, arrival.data)
+        self._writer.write(arrival.received_at, arrival.data, arrival.peer)
         self._arrivals += 1
 
     def refuse(self, arrival: Arrival) -> None:
         if self._refused is None:
             self._refused_whole = WholeFile(self._folder / INPUTS / f"{self.described.name}.refused.pcap")
             self._refused = PcapWriter(self._refused_whole)
-        self._refused.write(arrival.received_at, arrival.data)
+        self._refused.write(arrival.received_at, arrival.data, arrival.peer)
         self._refusals += 1
 
     def flush(self) -> InputFile:

@@ -11,8 +11,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from gateway.runtime.places import PlaceFinder
-
 from adapters import Arrival, Source
 from adapters.decode import Decoder
 from gateway import __version__
@@ -21,6 +19,7 @@ from gateway.picture import Picture
 from gateway.pipeline import State, initial, step
 from gateway.runtime.folder import Record, make_folder, session_name
 from gateway.runtime.outputs import Outputs
+from gateway.runtime.places import PlaceFinder
 from gateway.runtime.recorder import Recorder
 from gateway.runtime.setup import Place, RunFailure, Setup
 from gateway.runtime.summary import Summary, Tally

@@ -8,10 +8,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from adapters.files import last_stamp
-
 from gateway.runtime.folder import SESSION_FILE, FolderError, Record, read_record, write_record
 from gateway.runtime.hold import is_held
+from gateway.runtime.inputs import SessionInput
 from gateway.runtime.outputs import RRD_FILE
 from gateway.sinks.parquet import finish, unfinished
 
@@ -77,8 +76,10 @@ def mend(folder: Path) -> str:
 def _watermark(folder: Path, record: Record) -> int:
     """How far a killed session goes: what it said last, or its last arrival."""
     said = record.watermark if record.watermark is not None else record.started_at
-    stamps = [last_stamp(folder / source.file) for source in record.sources if (folder / source.file).exists()]
-    return max([said, *(stamp for stamp in stamps if stamp is not None)])
+    for source in record.sources:
+        for arrival in SessionInput(folder / source.file, source.source).arrivals():
+            said = max(said, arrival.received_at)
+    return said
 
 
 def _repair_rrd(path: Path) -> None:

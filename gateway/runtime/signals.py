@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import signal
 import threading
+from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any, Self
 
 
 class StopSignals:
-    """A context in which signals only ask. Outside the main thread it changes nothing and is never asked."""
+    """A context in which signals only ask, and call `then`. Outside the main thread it changes nothing."""
 
-    def __init__(self) -> None:
+    def __init__(self, then: Callable[[], None] = lambda: None) -> None:
         self.asked_by: str | None = None
+        self._then = then
         self._before: dict[int, Any] = {}
 
     def __call__(self) -> str | None:
@@ -39,3 +41,4 @@ class StopSignals:
         if self.asked_by is not None and number == signal.SIGINT:
             raise KeyboardInterrupt
         self.asked_by = "Ctrl-C" if number == signal.SIGINT else "SIGTERM"
+        self._then()

@@ -1,0 +1,161 @@
+"""`talkdown simulate`: a simulated world on the real wires, or into an archived session."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gateway.cli import options as take
+from gateway.cli.failures import RunError, UsageError
+from gateway.cli.replay import read_speed
+
+if TYPE_CHECKING:
+    from sim.scene import Scene
+
+_HELP = """
+Play a simulated world onto the real wires: aircraft as MAVLink, radars as landing-radar datagrams, over UDP.
+
+Scenes: [bold]approach[/] (paper 003's case), [bold]landing[/] (the same down to a standstill), [bold]traffic[/] (many
+aircraft). The scene [bold]radar[/] is a landing radar that watches the aircraft of a recording or of a live link.
+
+Examples:
+
+  talkdown simulate approach
+
+  talkdown simulate traffic --set aircraft=12 --set radars=2 --set gps.error_east_m=30 --seed 7
+
+  talkdown simulate approach --speed max --archive sessions
+
+  talkdown simulate radar --watch flight.tlog --site field.toml --archive sessions
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("simulate", help=_HELP)(simulate)
+
+
+def simulate(
+    scene: Annotated[
+        str, typer.Argument(metavar="SCENE", help="approach, landing, traffic, or radar.", show_default=False)
+    ],
+    site: take.SiteOption = None,
+    mavlink: Annotated[
+        str, typer.Option("--mavlink", metavar="URL", help="Where aircraft send.")
+    ] = "udpout:127.0.0.1:14550",
+    radar: Annotated[str, typer.Option("--radar", metavar="URL", help="Where radars send.")] = "udpout:127.0.0.1:30070",
+    seed: Annotated[int, typer.Option("--seed", metavar="N", help="Of the random numbers.")] = 0,
+    speed: Annotated[str, typer.Option("--speed", metavar="max|N", help="N times real time.")] = "1",
+    archive: Annotated[
+        Path | None,
+        typer.Option(
+            "--archive", metavar="DIR", help="Write a session into DIR instead of sending.", show_default=False
+        ),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="A sensor's parameter, such as gps.period_s=1; repeatable.",
+            show_default=False,
+        ),
+    ] = None,
+    watch: Annotated[
+        str | None,
+        typer.Option("--watch", metavar="FILE|URL", help="For the scene radar: what it looks at.", show_default=False),
+    ] = None,
+    quiet: take.QuietOption = False,
+) -> None:
+    """Play a simulated world."""
+    pace = read_speed(speed, 1.0)
+    if (scene == "radar") != (watch is not None):
+        raise UsageError("--watch belongs to the scene radar: talkdown simulate radar --watch FILE|URL.")
+    if watch is not None:
+        from gateway.cli.watching import watch_and_send
+
+        watch_and_send(watch, site, radar, seed=seed, settings=settings or [], speed=pace, archive=archive, quiet=quiet)
+        return
+    built = _build(scene, site, seed, settings or [])
+    if archive is not None:
+        _write(built, archive, quiet)
+    else:
+        _send(built, mavlink, radar, pace, quiet)
+
+
+def _build(name: str, site: Path | None, seed: int, settings: list[str]) -> Scene:
+    import time
+
+    from gateway.settings import DEMO_SITE
+    from sim.overrides import OverrideError
+    from sim.scenes import build_scene
+
+    place = take.read_place(site)
+    keys = take.read_keys(place, site)
+    start_ns = time.time_ns() // 4000 * 4000
+    try:
+        return build_scene(
+            name, start_ns=start_ns, site=place.site if place else DEMO_SITE, seed=seed, changes=settings, keys=keys
+        )
+    except OverrideError as error:
+        raise UsageError(str(error)) from error
+
+
+def _write(scene: Scene, archive: Path, quiet: bool) -> None:
+    from gateway.runtime.folder import FolderError
+    from sim.recording import write_session
+
+    try:
+        with _Progress(scene.duration_s, quiet) as progress:
+            folder = write_session(scene, archive, command=tuple(sys.argv[1:]), progress=progress)
+    except FolderError as error:
+        raise UsageError(str(error)) from error
+    except OSError as error:
+        raise RunError(f"{archive} could not be written: {(error.strerror or str(error)).lower()}.") from error
+    if not quiet:
+        print(f"archived in {folder}")
+
+
+def _send(scene: Scene, mavlink: str, radar: str, pace: float | None, quiet: bool) -> None:
+    from gateway.runtime.signals import StopSignals
+    from gateway.runtime.urls import MAVLINK_PORT, RADAR_PORT, LinkError
+    from sim.run import play
+
+    (mavlink_url,), (radar_url,) = take.read_urls([mavlink], MAVLINK_PORT), take.read_urls([radar], RADAR_PORT)
+    for url in (mavlink_url, radar_url):
+        if url.scheme != "udpout":
+            raise UsageError(f"simulate sends, so it needs udpout:HOST:PORT and not {url}.")
+    stop = threading.Event()
+    try:
+        with StopSignals(stop.set), _Progress(scene.duration_s, quiet) as progress:
+            sent = play(scene, mavlink_url, radar_url, speed=pace, stop=stop, progress=progress)
+    except LinkError as error:
+        raise UsageError(str(error)) from error
+    except OSError as error:
+        raise RunError(f"Sending failed: {(error.strerror or str(error)).lower()}.") from error
+    if not quiet:
+        print(f"sent {' and '.join(f'{number} {kind}' for kind, number in sent.items()) or 'nothing'}")
+
+
+class _Progress:
+    """A bar on stderr that is told the scene's second."""
+
+    def __init__(self, duration_s: float, quiet: bool) -> None:
+        from rich.console import Console
+        from rich.progress import Progress
+
+        console = Console(stderr=True)
+        self._bar = Progress(console=console, transient=True, disable=quiet or not console.is_terminal)
+        self._task = self._bar.add_task("seconds of the scene", total=duration_s)
+
+    def __enter__(self) -> Callable[[float], None]:
+        self._bar.start()
+        return lambda second: self._bar.update(self._task, completed=second)
+
+    def __exit__(self, *left: object) -> None:
+        self._bar.stop()

@@ -1,0 +1,40 @@
+"""The inputs of an archived session, read back as the arrivals that they were."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from adapters import Arrival, Source
+from adapters.files import FileError
+from adapters.pcap import PcapReader
+from adapters.tlog import TlogReader
+
+
+@dataclass(slots=True)
+class SessionInput:
+    """One source's file of an archived session; it may be empty. Read as what it was recorded as."""
+
+    path: Path
+    source: Source
+    counters: Counter[str] = field(default_factory=Counter)
+    sources: tuple[Source, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.sources = (self.source,)
+
+    def arrivals(self) -> Iterator[Arrival]:
+        """Every arrival. Raises FileError when the file is gone."""
+        try:
+            with self.path.open("rb") as file:
+                if self.source.kind == "mavlink":
+                    for stamp, frame in TlogReader(file, self.counters):
+                        yield Arrival(stamp, self.source.number, frame)
+                elif file.read(1):
+                    file.seek(0)
+                    for captured in PcapReader(file, self.counters):
+                        yield Arrival(captured.received_at, self.source.number, captured.data, captured.sender)
+        except OSError as error:
+            raise FileError(f"{self.path} cannot be read ({(error.strerror or str(error)).lower()}).") from error
