@@ -44,7 +44,7 @@ class _Window:
         if 0 < ahead < _WRAP // 2:
             elapsed_s = max(time - self.newest_time, 0) / 10**9
             if ahead > WINDOW and ahead > _FASTEST_HZ * elapsed_s:
-                return self._restart(sequence, time)
+                return self._restart(sequence, time) if time > self.newest_time or not keyed else ("replayed", "", 0)
             self.seen = (self.seen << ahead | 1) & ((1 << WINDOW) - 1) if ahead < WINDOW else 1
             self.newest, self.newest_time = sequence, max(time, self.newest_time)
             return None, "", ahead - 1
@@ -69,7 +69,7 @@ class _Window:
         self.newest, self.newest_time, self.seen = sequence, time, 1
 
     def _restart(self, sequence: int, time: int) -> tuple[Reason | None, str, int]:
-        self.floor_time = self.newest_time
+        self.floor_time = self.newest_time if time > self.newest_time else -1
         self._begin(sequence, time)
         return None, "restarted", 0
 
