@@ -103,6 +103,7 @@ def replay(
             archive=archive,
             serve=take.read_serve(serve, looks),
             keys=take.read_keys(place, site),
+            is_watched=pace is not None or looks is not take.Viewer.none,
             name=files[0].stem if place is None and playback.place is None else "",
             command=tuple(sys.argv[1:]),
         )

@@ -17,7 +17,7 @@ from gateway.runtime.summary import Summary
 TICK_S = 0.02
 _REPLAY_STEP_NS = 1_000_000_000  # of stamps, at full speed: large steps are cheap steps
 _PACED_STEP_NS = 40_000_000
-_NO_PLACE_AFTER_S = 60.0
+_NO_PLACE_AFTER_S = 90.0  # after a minute even the first position would do
 
 Watch = Callable[[Run, Picture | None], None]
 """What a caller does after each step: show progress, tell events. It must not take long."""

@@ -76,7 +76,7 @@ class Run:
         if self._recorder is not None:
             self._recorder.describe(site=place.text, site_origin=place.origin)
         try:
-            self.outputs = Outputs(place.site, self.folder, self.setup.serve)
+            self.outputs = Outputs(place.site, self.folder, self.setup.serve, watched=self.setup.is_watched)
         except OSError as error:
             raise self._failure(error) from error
 
@@ -102,14 +102,15 @@ class Run:
         self._watermark = max(self._watermark, watermark)
         mark = self._decoder.watermark(self._watermark)
         heard.append(replace(mark, notes=(*mark.notes, *notes)) if notes else mark)
-        if self._state is None:
-            self._hold(heard)
-            heard = self._held
-            if self._state is None:
-                self._flush_when_due()
-                return None
-            self._held = []
-        return self._step(heard)
+        if self._state is not None:
+            return self._step(heard)
+        self._hold(heard)
+        if self.place is None:
+            self._flush_when_due()
+            return None
+        held, self._held = self._held, []
+        note = ("info", f"Site: {self.place.origin}.")
+        return self._step([*held[:-1], replace(held[-1], notes=(*held[-1].notes, note))])
 
     def _take(self, arrival: Arrival) -> Heard | None:
         """Record and decode one arrival; None when it holds nothing for the picture."""

@@ -40,5 +40,6 @@ class Setup:
     serve: Serve | None = None  # None: no viewer can come
     keys: Mapping[int, bytes] = field(default_factory=dict)  # a radar's number -> its key
     live: bool = False
+    is_watched: bool = True  # False: drawn in large batches, for a replay as fast as it goes that nobody looks at
     name: str = ""  # of the session's folder; without one the site's
     command: tuple[str, ...] = ()

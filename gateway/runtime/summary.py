@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from gateway.observation import Observation
 from gateway.picture import Picture, SourceHealth
 from gateway.runtime.accuracy import Accuracy, Score
 from gateway.settings import Runway
@@ -67,8 +66,7 @@ class Tally:
 
     def add(self, picture: Picture) -> None:
         """Count one picture."""
-        self.observations.update(_kind(observation) for observation in picture.observations)
-        self.observations["Truth"] += len(picture.truth)
+        self.observations.update(type(observation).__name__ for observation in picture.observations)
         self.tracks.update(picture.fuse.track.tolist())
         self.aircraft.update(name for name in picture.fuse.aircraft if name is not None)
         self.changes.update(change.kind for change in picture.associate.changes)
@@ -81,7 +79,3 @@ class Tally:
         """Counts by what people call them."""
         return {KINDS.get(kind, kind): number for kind, number in sorted(self.observations.items()) if number}
 
-
-def _kind(observation: Observation) -> str:
-    name = type(observation).__name__
-    return "" if name == "Truth" else name  # truths are counted where the picture keeps them
