@@ -42,7 +42,16 @@ class SceneParameters:
 
 _PROBABILITIES = ("missing", "missing_range", "missing_azimuth", "missing_elevation", "detection_probability")
 _ABOVE_ZERO = ("period_s", "heartbeat_period_s", "clock_period_s", "attitude_period_s", "status_period_s", "duration_s")
-_ANY_SIGN = ("_error_m", "_error_rad", "error_east_m", "error_north_m", "error_up_m", "time_error_s", "abeam_deg")
+_ANY_SIGN = (
+    "_error_m",
+    "_error_rad",
+    "_error_deg",
+    "error_east_m",
+    "error_north_m",
+    "error_up_m",
+    "time_error_s",
+    "abeam_deg",
+)
 _COUNTS = {"aircraft": (0, LARGEST_SYSTEM), "radars": (0, 20), "first_number": (1, 60_000)}
 
 
@@ -134,8 +143,9 @@ def _value(key: str, text: str, kind: Any) -> Any:
     if name in _PROBABILITIES:
         low, high = 0.0, 1.0
     if not low <= number <= high or math.isinf(number) or (name in _ABOVE_ZERO and number == 0.0):
-        above = "above 0" if name in _ABOVE_ZERO else f"from {low:g} to {high:g}"
-        raise OverrideError(f"{key}: must be {above}, not {text}.")
+        least = "above 0" if name in _ABOVE_ZERO else "finite" if low < 0.0 else f"at least {low:g}"
+        bounds = f"from {low:g} to {high:g}" if math.isfinite(high) else least
+        raise OverrideError(f"{key}: must be {bounds}, not {text}.")
     return number
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
-from adapters.pcap import PcapWriter
 
 from adapters import Arrival, Source
+from adapters.pcap import PcapWriter
 from gateway import __version__
 from gateway.runtime.folder import Record, make_folder, session_name
 from gateway.runtime.recorder import Recorder

@@ -66,7 +66,9 @@ def test_positions_are_ends_of_geodesics(latitude_deg: float, landing_deg: float
     plan = CasePath().motion(times).position
     flown = fly(CasePath(), runway, times)
     centre = np.full(50, 179.9), np.full(50, latitude_deg)
-    bearing, _, distance = Geod(ellps="WGS84").inv(*centre, np.degrees(flown.longitude_rad), np.degrees(flown.latitude_rad))
+    bearing, _, distance = Geod(ellps="WGS84").inv(
+        *centre, np.degrees(flown.longitude_rad), np.degrees(flown.latitude_rad)
+    )
     assert distance == pytest.approx(np.hypot(plan[:, 0], plan[:, 1]), abs=1e-5)
     expected = landing_deg - np.degrees(np.arctan2(plan[:, 1], plan[:, 0]))
     assert np.cos(np.radians(bearing - expected)) == pytest.approx(np.ones(50), abs=1e-14)

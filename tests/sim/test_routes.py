@@ -55,7 +55,7 @@ def test_turns_join_the_legs_whatever_their_angle(angle_deg: float) -> None:
 
 def test_corners_that_are_too_near_are_refused() -> None:
     """A turn that does not fit between two corners is an error that names them."""
-    with pytest.raises(ValueError, match="points 0 and 1 of|route points 0 and 1"):
+    with pytest.raises(ValueError, match="points 0 and 1 of the route"):
         RoutePath(_legs((0.0, 0.0, 500.0, 100.0), (1e3, 0.0, 500.0, 100.0), (1e3, 30e3, 500.0, 100.0)))
     with pytest.raises(ValueError, match="back on itself"):
         RoutePath(_legs((0.0, 0.0, 500.0, 100.0), (30e3, 0.0, 500.0, 100.0), (0.0, 100.0, 500.0, 100.0)))
@@ -77,7 +77,8 @@ def test_traffic_flies_within_its_limits() -> None:
         start, end = scene.present(aircraft)
         flown = scene.flown(aircraft, np.arange(start, end, 0.5))
         assert np.degrees(np.max(np.abs(flown.roll_rad))) < 25.5, aircraft
-        assert -8.0 < np.min(flown.velocity_mps[:, 2]) and np.max(flown.velocity_mps[:, 2]) < 10.0, aircraft
+        assert np.min(flown.velocity_mps[:, 2]) > -8.0, aircraft
+        assert np.max(flown.velocity_mps[:, 2]) < 10.0, aircraft
         assert np.min(flown.height_m) > 499.99, aircraft
 
 
