@@ -15,8 +15,8 @@ _RECENT = rrb.TimeRange(  # an approach lasts this long; left alone the viewer s
 )
 
 
-def blueprint(site: Site) -> rrb.Blueprint:
-    """The views of a session at this site; every one of them has data from the first seconds on."""
+def blueprint(site: Site, *, modes: bool = False) -> rrb.Blueprint:
+    """The views of a session at this site; one of the mode probabilities only where the estimator has `modes`."""
     units = style.units_of(site)
     return rrb.Blueprint(
         rrb.Horizontal(
@@ -41,7 +41,7 @@ def blueprint(site: Site) -> rrb.Blueprint:
                 ),
                 rrb.Tabs(
                     _plot(f"Biases, {units.length}", ["/register/gps/**", "/register/radar/**"]),
-                    _plot("Modes", ["/fuse/modes/**"]),
+                    *([_plot("Modes", ["/fuse/modes/**"])] if modes else []),
                     _plot(f"Speed, {units.speed}", ["/fuse/**", "- /fuse/modes/**", "- /fuse/sigma/**"]),
                     _plot(f"Sigma, {units.length}", ["/fuse/sigma/**"]),
                     _plot("Association", ["/associate/**"]),

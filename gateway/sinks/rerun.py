@@ -25,7 +25,7 @@ class RerunSink:
     Pictures are gathered for `period_s` of session time or until `rows_limit` rows of tracks and raw
     positions wait, then drawn as columns: 0.4 s for people who watch, 10 s where a recording is replayed as
     fast as it goes (an entity costs the same for one row as for a hundred). `serve` is (host, port) to listen
-    on, port 0 for a free one.
+    on, port 0 for a free one. `modes`: the estimator has motion modes, their probabilities get a view.
 
     The file is written in the caller's thread and never drops; `write`, `flush` and `close` raise OSError
     when the disk does not take it. Viewers are fed from a thread of their own and can slow nothing: what they
@@ -41,12 +41,13 @@ class RerunSink:
         application: str = "talkdown",
         recording: str | None = None,
         name: str | None = None,
+        modes: bool = False,
         memory_limit: str = "256MiB",
         period_s: float = 0.4,
         rows_limit: int = 256,
     ) -> None:
         identity = Identity(application, recording or str(uuid.uuid4()), name or site.name)
-        views = blueprint(site)
+        views = blueprint(site, modes=modes)
         self._served = ServedFeed(*serve, identity, views, memory_limit) if serve else None
         try:
             self._file = FileFeed(path, identity, views) if path else None

@@ -43,6 +43,7 @@ class _Drawn:
 
     trail: Trail
     labelled: int = BEFORE_ALL
+    labelled_state: str = ""
     state: str = ""
     named: set[str] = field(default_factory=set)
 
@@ -148,9 +149,9 @@ class TrackScene:
         """Who it is, how high, how fast: the data block of a controller's screen."""
         units, chosen, texts = self._units, [], []
         for row, now in enumerate(flown.time.tolist()):
-            if now - drawn.labelled < LABEL_NS and flown.state[row] == drawn.state:
+            if now - drawn.labelled < LABEL_NS and flown.state[row] == drawn.labelled_state:
                 continue
-            drawn.labelled = now
+            drawn.labelled, drawn.labelled_state = now, flown.state[row]
             who = flown.aircraft[row] or f"radar {flown.radar_track[row]}"
             east, north, up = flown.velocity_mps[row].tolist()
             speed = f"{np.hypot(east, north) * units.speeds:.0f} {units.speed}"

@@ -30,25 +30,60 @@ def test_tables_have_the_columns_that_other_programs_read(tmp_path, pictures):
     finish(tmp_path)
     time = pa.timestamp("ns", tz="UTC")
     tracks = pq.read_schema(tmp_path / "tracks.parquet")
-    assert tracks.names == (
-        "time received track aircraft radar_track updated_by state latitude_deg longitude_deg height_m altitude_msl_m "
-        "velocity_east_mps velocity_north_mps velocity_up_mps covariance straight left right"
-    ).split()
+    assert tracks.names == [
+        "time",
+        "received",
+        "track",
+        "aircraft",
+        "radar_track",
+        "updated_by",
+        "state",
+        "latitude_deg",
+        "longitude_deg",
+        "height_m",
+        "altitude_msl_m",
+        "velocity_east_mps",
+        "velocity_north_mps",
+        "velocity_up_mps",
+        "covariance",
+        "straight",
+        "left",
+        "right",
+    ]
     assert (tracks.field("time").type, tracks.field("received").type) == (time, time)
     assert tracks.field("track").type == pa.int64()
     assert tracks.field("covariance").type.list_size == 36
     predictions = pq.read_schema(tmp_path / "predictions.parquet")
-    assert predictions.names == (
-        "made track valid horizon_s latitude_deg longitude_deg height_m sigma_m method intent intent_kind confidence"
-    ).split()
+    assert predictions.names == [
+        "made",
+        "track",
+        "valid",
+        "horizon_s",
+        "latitude_deg",
+        "longitude_deg",
+        "height_m",
+        "sigma_m",
+        "method",
+        "intent",
+        "intent_kind",
+        "confidence",
+    ]
     truth = pq.read_schema(tmp_path / "truth.parquet")
-    assert truth.names == (
-        "time aircraft latitude_deg longitude_deg height_m velocity_east_mps velocity_north_mps velocity_up_mps mode"
-    ).split()
+    assert truth.names == [
+        "time",
+        "aircraft",
+        "latitude_deg",
+        "longitude_deg",
+        "height_m",
+        "velocity_east_mps",
+        "velocity_north_mps",
+        "velocity_up_mps",
+        "mode",
+    ]
 
 
 def test_rows_stand_in_the_order_in_which_they_were_written_bit_for_bit(tmp_path, pictures):
-    made = pictures(20.0)
+    made = pictures(40.0)
     archive(tmp_path, made)
     finish(tmp_path)
     table = pq.read_table(tmp_path / "tracks.parquet")
@@ -67,7 +102,9 @@ def test_rows_stand_in_the_order_in_which_they_were_written_bit_for_bit(tmp_path
 def test_what_is_not_known_is_null(tmp_path, pictures):
     picture = next(one for one in pictures(6.0, modes=False) if len(one.fuse.time))
     rows = len(picture.fuse.time)
-    unknown = replace(picture.fuse, received=np.full(rows, -1), height_m=np.full(rows, math.nan), aircraft=(None,) * rows)
+    unknown = replace(
+        picture.fuse, received=np.full(rows, -1), height_m=np.full(rows, math.nan), aircraft=(None,) * rows
+    )
     archive(tmp_path, [replace(picture, fuse=unknown)])
     finish(tmp_path)
     table = pq.read_table(tmp_path / "tracks.parquet")
@@ -99,7 +136,7 @@ def test_rows_older_than_a_second_are_on_disk_while_the_session_runs(tmp_path, p
 
 
 def test_a_stream_cut_at_any_byte_keeps_every_whole_batch(tmp_path, pictures):
-    archive(tmp_path, pictures(5.0))
+    archive(tmp_path, pictures(20.0))
     stream = tmp_path / "tracks.arrows"
     data = stream.read_bytes()
     lengths = [len(batch) for batch in whole_batches(stream)]
@@ -116,7 +153,7 @@ def test_a_stream_cut_at_any_byte_keeps_every_whole_batch(tmp_path, pictures):
 
 
 def test_finish_makes_parquet_of_a_cut_stream_and_takes_the_stream_away(tmp_path, pictures):
-    archive(tmp_path, pictures(5.0))
+    archive(tmp_path, pictures(20.0))
     stream = tmp_path / "tracks.arrows"
     whole = sum(len(batch) for batch in whole_batches(stream))
     stream.write_bytes(stream.read_bytes()[:-100])
@@ -134,7 +171,7 @@ def test_a_stream_without_a_byte_becomes_an_empty_table(tmp_path):
     assert pq.read_table(tmp_path / "tracks.parquet").num_rows == 0
 
 
-@pytest.fixture()
+@pytest.fixture
 def small_disk() -> Iterator[None]:
     """No file of this process may grow beyond 24 kB: what a full disk looks like to a writer."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -146,15 +183,14 @@ def small_disk() -> Iterator[None]:
 def test_a_full_disk_raises_and_leaves_whole_batches(tmp_path, pictures, small_disk):
     made = pictures(60.0)
     sink = ArrowSink(tmp_path)
-    with pytest.raises(OSError, match=r"could not be written.*tracks\.arrows"):
+    with pytest.raises(OSError, match=r"could not be written.*\.arrows"):
         for picture in made:
             sink.write(picture)
     sink.close()  # it was said: closing is silent
-    stream = tmp_path / "tracks.arrows"
-    assert sum(len(batch) for batch in whole_batches(stream)) > 0
-    assert stream.stat().st_size <= 24_000
-    with pa.memory_map(str(stream)) as source:  # no half batch stands at its end
-        pa.ipc.open_stream(source).read_all()
+    for stream in tmp_path.glob("*.arrows"):
+        assert stream.stat().st_size <= 24_000
+        with pa.memory_map(str(stream)) as source:  # no half batch stands at its end
+            assert pa.ipc.open_stream(source).read_all().num_rows > 0
 
 
 def test_a_session_that_was_killed_lacks_at_most_the_last_second(tmp_path):

@@ -1,0 +1,231 @@
+"""The session's recording: what is drawn, when, where, and that the file keeps it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from gateway.frames import RunwayFrame
+from gateway.fuse import Fused
+from gateway.settings import DEMO_SITE
+from gateway.sinks.recording import optimise
+from gateway.sinks.rerun import RerunSink
+
+Entities = dict[str, list[dict[str, Any]]]
+START = 1_772_366_400_000_000_000
+
+
+@pytest.fixture(autouse=True)
+def _bad_input_raises() -> Iterator[None]:
+    rr.set_strict_mode(True)
+    yield
+    rr.set_strict_mode(False)
+
+
+def record(path: Path, pictures: list, **options: Any) -> None:
+    sink = RerunSink(options.pop("site", DEMO_SITE), path=path, **options)
+    for picture in pictures:
+        sink.write(picture)
+    sink.close()
+
+
+@pytest.mark.filterwarnings("ignore:RRD file has no footer")
+def read(path: Path) -> Entities:
+    """The rows of each entity: component name -> value, with `utc` in ns; static rows have no `utc`."""
+    found: Entities = defaultdict(list)
+    for chunk in RrdReader(path).stream():
+        batch = chunk.to_record_batch()
+        columns = {name: batch.column(name) for name in batch.schema.names}
+        if "utc" in columns:
+            columns["utc"] = columns["utc"].cast("int64")
+        values = {name: column.to_pylist() for name, column in columns.items()}
+        for row in range(batch.num_rows):
+            found[chunk.entity_path].append({name: column[row] for name, column in values.items()})
+    return found
+
+
+def times(entities: Entities, path: str) -> list[int]:
+    return [row["utc"] for row in entities[path] if "utc" in row]
+
+
+def texts(entities: Entities) -> list[str]:
+    return [row["TextLog:text"][0] for row in entities["/log"]]
+
+
+@pytest.fixture
+def drawn(tmp_path, pictures) -> Entities:
+    record(tmp_path / "a.rrd", pictures(30.0))
+    return read(tmp_path / "a.rrd")
+
+
+def test_every_root_of_the_data_path_is_drawn(drawn):
+    roots = {path.split("/")[1] for path in drawn}
+    assert roots >= {"site", "raw", "align", "track", "associate", "register", "fuse", "predict"}
+    assert roots >= {"approach", "truth", "health", "log"}
+
+
+def test_identities_with_colons_and_slashes_stay_one_part_of_a_path(drawn):
+    assert r"/raw/gps/mavlink\:1" in drawn
+    assert "/raw/radar/1/3" in drawn
+
+
+def test_fused_rows_stand_in_the_runway_frame_and_on_the_map(tmp_path, pictures):
+    made = pictures(10.0)
+    record(tmp_path / "a.rrd", made)
+    row = next(row for row in read(tmp_path / "a.rrd")["/fuse/1"] if "utc" in row)
+    fused = next(one.fuse for one in made if row["utc"] in one.fuse.time)
+    index = fused.time.tolist().index(row["utc"])
+    assert row["Points3D:positions"][0] == pytest.approx(fused.runway_m[index].tolist(), rel=1e-6)
+    degrees = [np.degrees(fused.latitude_rad[index]), np.degrees(fused.longitude_rad[index])]
+    assert row["GeoPoints:positions"][0] == pytest.approx(degrees, abs=1e-12)
+    east, north, up = fused.velocity_mps[index]
+    assert row["Scalars:scalars"] == pytest.approx([np.hypot(east, north), -up])
+
+
+def test_a_row_of_the_past_is_not_drawn_over_a_newer_one(tmp_path, pictures):
+    made = pictures(40.0)
+    record(tmp_path / "a.rrd", made)
+    written = np.concatenate([one.fuse.time for one in made])
+    assert (np.diff(written) < 0).any()
+    drawn_at = times(read(tmp_path / "a.rrd"), "/fuse/1")
+    expected = written[written >= np.maximum.accumulate(written)]
+    assert drawn_at == expected.tolist()
+
+
+def test_how_pictures_fall_into_batches_changes_no_row(tmp_path, pictures):
+    made = pictures(25.0)
+    record(tmp_path / "a.rrd", made, period_s=0.4)
+    record(tmp_path / "b.rrd", made, period_s=10.0, rows_limit=10_000)
+    small, large = read(tmp_path / "a.rrd"), read(tmp_path / "b.rrd")
+    assert small.keys() == large.keys()
+    for path in ("/fuse/1", "/fuse/1/trail/0", "/fuse/1/label", "/predict/1", "/log", "/raw/radar/1/3/trail/0"):
+        assert times(small, path) == times(large, path), path
+    assert small["/fuse/1/trail/0"][-1]["LineStrips3D:strips"] == large["/fuse/1/trail/0"][-1]["LineStrips3D:strips"]
+
+
+def test_the_trail_at_any_instant_ends_where_the_track_was(tmp_path, pictures):
+    record(tmp_path / "a.rrd", pictures(150.0), period_s=10.0, rows_limit=10_000)
+    entities = read(tmp_path / "a.rrd")
+    for segment in ("0", "1"):
+        rows = [row for row in entities[f"/fuse/1/trail/{segment}"] if "utc" in row]
+        here = {row["utc"]: row["Points3D:positions"][0] for row in entities["/fuse/1"] if "utc" in row}
+        assert len(rows) > 5
+        for row in rows:
+            assert row["LineStrips3D:strips"][0][-1] == here[row["utc"]]
+    ended, begun = (entities[f"/fuse/1/trail/{segment}"] for segment in ("0", "1"))
+    first = next(row for row in begun if "utc" in row)
+    assert first["LineStrips3D:strips"][0][0] == ended[-1]["LineStrips3D:strips"][0][-1]  # without a gap
+
+
+def test_the_point_of_association_is_marked_and_said(drawn):
+    (mark,) = [row for row in drawn[r"/associate/point/mavlink\:1"] if "utc" in row]
+    assert mark["Points3D:labels"] == ["mavlink:1 is radar track 1/3"]
+    assert sum("mavlink:1 is radar track 1/3" in text for text in texts(drawn)) == 1
+
+
+def test_a_track_that_ends_is_said_and_leaves_the_scene(tmp_path, pictures):
+    record(tmp_path / "a.rrd", pictures(20.0, end=True))
+    entities = read(tmp_path / "a.rrd")
+    assert any("track 1 ended: no data for 30 s" in text for text in texts(entities))
+    for path in ("/fuse/1", "/predict/1", "/approach/1", r"/raw/gps/mavlink\:1", "/raw/radar/1/3"):
+        assert entities[path][-1].get("Clear:is_recursive") == [True], path
+    assert entities["/fuse/state/1"][-1]["StateChange:state"] == ["ended"]
+
+
+def test_an_estimator_without_modes_draws_none(tmp_path, pictures):
+    record(tmp_path / "a.rrd", pictures(10.0, modes=False))
+    assert not any(path.startswith("/fuse/modes") for path in read(tmp_path / "a.rrd"))
+
+
+def test_aviation_units_are_feet_and_knots(tmp_path, pictures):
+    site = replace(DEMO_SITE, units="aviation")
+    record(tmp_path / "a.rrd", pictures(20.0), site=site)
+    entities = read(tmp_path / "a.rrd")
+    static = next(row for row in entities["/fuse/1"] if "SeriesLines:names" in row)
+    assert static["SeriesLines:names"] == ["track 1 speed, kn", "track 1 sink rate, ft/min"]
+    speed = next(row["Scalars:scalars"][0] for row in entities["/fuse/1"] if "utc" in row)
+    assert speed == pytest.approx(130.0 * 3600.0 / 1852.0, rel=0.1)
+    label = next(row["Points3D:labels"][0] for row in entities["/fuse/1/label"] if "utc" in row)
+    assert " ft " in label
+    assert " kn " in label
+
+
+def test_a_position_without_a_full_place_is_left_out(tmp_path, pictures):
+    made = pictures(10.0)
+    missing = sum(int(np.isnan(one.align.plot_runway_m).any(axis=1).sum()) for one in made)
+    plots = sum(len(one.align.plot_time) for one in made)
+    assert missing > 0
+    record(tmp_path / "a.rrd", made)
+    assert len(times(read(tmp_path / "a.rrd"), "/raw/radar/1/3")) == plots - missing
+
+
+def test_a_step_without_anything_is_drawn_without_complaint(tmp_path, pictures):
+    picture = pictures(0.2)[0]
+    nothing = replace(picture, observations=(), truth=(), events=(), fuse=empty(picture.fuse))
+    record(tmp_path / "a.rrd", [nothing])
+    assert "/fuse/1" not in read(tmp_path / "a.rrd")
+
+
+def empty(fused: Fused) -> Fused:
+    """The same without a row."""
+    columns = {name: getattr(fused, name)[:0] for name in Fused.__dataclass_fields__}
+    return Fused(**columns)
+
+
+def test_the_glide_path_of_the_scene_meets_the_runway_at_the_aiming_point(drawn):
+    (row,) = [row for row in drawn["/site/glide_path"] if "LineStrips3D:strips" in row]
+    top, foot = row["LineStrips3D:strips"][0]
+    aim = DEMO_SITE.runway.aiming_point_x_m
+    assert foot == pytest.approx([aim, 0.0, 0.0])
+    assert np.arctan2(top[2], aim - top[0]) == pytest.approx(DEMO_SITE.runway.glide_path_rad)
+    latitude, longitude = row["GeoLineStrings:line_strings"][0][1]
+    expected = RunwayFrame(DEMO_SITE.runway).geodetic_from_runway(np.array([[aim, 0.0, 0.0]]))
+    assert np.radians([latitude, longitude]) == pytest.approx([expected[0][0], expected[1][0]], abs=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore:RRD file has no footer")
+def test_a_session_that_was_killed_opens_and_lacks_at_most_the_last_second(tmp_path):
+    script = (
+        "import os, sys, runpy; from pathlib import Path; from gateway.sinks.rerun import RerunSink\n"
+        "from gateway.settings import DEMO_SITE\n"
+        "make = runpy.run_path(sys.argv[1])['make_pictures']\n"
+        "sink = RerunSink(DEMO_SITE, path=Path(sys.argv[2]))\n"
+        "for picture in make(10.0): sink.write(picture)\n"
+        "os.kill(os.getpid(), 9)"
+    )
+    path = tmp_path / "session.rrd"
+    made = Path(__file__).with_name("conftest.py")
+    subprocess.run([sys.executable, "-c", script, str(made), str(path)], check=False)
+    assert max(times(read(path), "/health/mavlink\\:1")) >= START + 8_800_000_000
+    assert optimise(path)
+    assert max(times(read(path), "/health/mavlink\\:1")) >= START + 8_800_000_000
+
+
+def test_optimising_keeps_every_row_and_makes_the_file_smaller(tmp_path, pictures):
+    path = tmp_path / "a.rrd"
+    record(path, pictures(30.0))
+    before, size = read(path), path.stat().st_size
+    assert optimise(path)
+    after = read(path)
+    assert path.stat().st_size < 0.5 * size
+    assert [file.name for file in tmp_path.iterdir()] == ["a.rrd"]
+    for name in ("/fuse/1", "/raw/radar/1/3", "/log", "/predict/1"):
+        assert sorted(times(after, name)) == sorted(times(before, name)), name
+
+
+def test_what_is_no_recording_stays_as_it_is(tmp_path):
+    path = tmp_path / "a.rrd"
+    path.write_bytes(b"not a recording")
+    assert not optimise(path)
+    assert path.read_bytes() == b"not a recording"
+    assert [file.name for file in tmp_path.iterdir()] == ["a.rrd"]
