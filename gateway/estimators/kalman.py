@@ -64,28 +64,30 @@ def predict(state: Estimate, elapsed_s: Floats, motion: Motion) -> Estimate:
 
     Source: 003 2.4 eq 17, 18.
     """
-    t = elapsed_s[:, None]
-    keep = np.exp(-np.abs(t) / motion.error_time_constant_s)
-    mean = state.mean.copy()
-    mean[:, POSITION] += t * state.mean[:, VELOCITY]
-    mean[:, ERROR] *= keep
-    p, t, keep = state.covariance, t[:, :, None], keep[:, :, None]
-    covariance = p.copy()
-    # F P F' by blocks: three cheap sums instead of two products with a matrix that is mostly zeros.
-    covariance[:, POSITION] += t * p[:, VELOCITY]
-    covariance[:, ERROR] *= keep
-    carried = covariance.copy()
-    carried[:, :, POSITION] += t * covariance[:, :, VELOCITY]
-    carried[:, :, ERROR] *= keep
-    q = motion.acceleration_density
-    span = np.abs(elapsed_s)[:, None]
-    axis = np.arange(3)
-    carried[:, axis, axis] += q * span * span * span / 3.0
-    carried[:, axis, axis + 3] += q * span * elapsed_s[:, None] / 2.0
-    carried[:, axis + 3, axis] += q * span * elapsed_s[:, None] / 2.0
-    carried[:, axis + 3, axis + 3] += q * span
-    carried[:, axis + 6, axis + 6] += motion.error_sigma_m**2 * (1.0 - keep[:, :, 0] * keep[:, :, 0])
-    return Estimate(mean, carried)
+    t = elapsed_s[:, None, None]
+    keep = np.exp(np.abs(t) / -motion.error_time_constant_s)
+    carry = _UNCHANGED + t * _VELOCITY_MOVES + keep * _ERROR_STAYS
+    span = np.abs(t) * motion.acceleration_density
+    noise = span * (t * t * _OF_POSITION + t * _OF_BOTH + _OF_VELOCITY)
+    noise += (motion.error_sigma_m**2 * (1.0 - keep * keep)) * _ERROR_STAYS
+    mean = (carry @ state.mean[:, :, None])[:, :, 0]
+    return Estimate(mean, carry @ state.covariance @ carry.transpose(0, 2, 1) + noise)
+
+
+def _blocks(*places: tuple[slice, slice], scale: float = 1.0) -> Floats:
+    """A 9 x 9 matrix with scaled identities in some of its 3 x 3 blocks."""
+    matrix = np.zeros((SIZE, SIZE))
+    for rows, columns in places:
+        matrix[rows, columns] = scale * np.eye(3)
+    return matrix
+
+
+_UNCHANGED = _blocks((POSITION, POSITION), (VELOCITY, VELOCITY))
+_VELOCITY_MOVES = _blocks((POSITION, VELOCITY))
+_ERROR_STAYS = _blocks((ERROR, ERROR))
+_OF_POSITION = _blocks((POSITION, POSITION), scale=1.0 / 3.0)
+_OF_BOTH = _blocks((POSITION, VELOCITY), (VELOCITY, POSITION), scale=0.5)
+_OF_VELOCITY = _blocks((VELOCITY, VELOCITY))
 
 
 def update(

@@ -155,9 +155,16 @@ def lane_of(lanes: Lanes, plot: Plot, key: Key, scene: Scene) -> int | None:
     return lanes.by_key.get((key, ordinal_of(scene.spans, key, plot.at)))
 
 
-def contains(lanes: Lanes, plot: Plot) -> bool:
-    """Whether some track has worked in a plot already."""
-    return any(event.measure is plot for lane in lanes.lanes.values() for event in reversed(lane.events))
+def contains(lanes: Lanes, track: int | None, plot: Plot) -> bool:
+    """Whether a track has worked in a plot already; only its newest measurements can be this one or hide it."""
+    if track is None:
+        return False
+    for event in reversed(lanes.lanes[track].events):
+        if event.measure.serial == plot.serial:
+            return True
+        if event.at < plot.at:
+            return False
+    return False
 
 
 def end_silent(lanes: Lanes, at: int, options: Options) -> tuple[Lanes, list[Ended]]:

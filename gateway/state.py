@@ -1,0 +1,42 @@
+"""What the picture remembers from one step to the next: one immutable value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from gateway.align import Geoid
+from gateway.associate import Association, Change
+from gateway.frames import RunwayFrame
+from gateway.fuse import Lanes
+from gateway.register import Registration
+from gateway.settings import Options, RadarSite, Site
+from gateway.track import RadarTracks
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """Everything the picture remembers: what each stage knows, the session's time, counters, and what was said."""
+
+    site: Site
+    options: Options
+    frame: RunwayFrame
+    radars: Mapping[int, RadarSite]  # from the site file, else from what a radar says of itself
+    geoid: Geoid
+    tracks: RadarTracks = RadarTracks()
+    association: Association = Association()
+    registration: Registration = Registration()
+    lanes: Lanes = Lanes()
+    now: int | None = None  # session time of the newest arrival or watermark
+    instant: int = 0  # the next whole second
+    serial: int = 0  # observations so far
+    steps: int = 0
+    counters: Mapping[str, int] = field(default_factory=dict)
+    said: frozenset[str] = frozenset()  # what is said once
+    reported: frozenset[Change] = frozenset()  # pairs made and lost, lately
+
+
+def initial(site: Site, options: Options = Options()) -> State:
+    """The state before the first arrival."""
+    radars = {radar.number: radar for radar in site.radars}
+    return State(site, options, RunwayFrame(site.runway), radars, Geoid(site.runway.geoid_separation_m))
