@@ -104,7 +104,7 @@ class SourceScene:
         entries: list[Entry] = []
         if path not in self._trails:
             line = kind == "line"
-            self._trails[path] = Trail(path, "line" if line else "points", colour, 1.0 if line else 1.3)
+            self._trails[path] = Trail(path, "line" if line else "points", colour, 1.0 if line else 0.8)
             look = rr.Points3D.from_fields(colors=colour, radii=style.points(2.0 if line else 3.5))
             ground = rr.GeoPoints.from_fields(colors=colour, radii=style.points(2.0 if line else 3.0))
             entries.append(Always(path, (look, ground)))

@@ -24,11 +24,15 @@ def small_disk() -> Iterator[None]:
     resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
+def write_all(sink: RerunSink, pictures: list) -> None:
+    for picture in pictures:
+        sink.write(picture)
+
+
 def test_a_disk_that_takes_no_more_raises_and_is_said_once(tmp_path, pictures, small_disk):
     sink = RerunSink(DEMO_SITE, path=tmp_path / "session.rrd")
     with pytest.raises(OSError, match=r"recording could not be written.*session\.rrd"):
-        for picture in pictures(60.0):
-            sink.write(picture)
+        write_all(sink, pictures(60.0))
     sink.close()
 
 
@@ -79,15 +83,13 @@ def test_a_viewer_that_takes_nothing_costs_rows_for_viewers_and_none_for_the_fil
     path: Path = tmp_path / "session.rrd"
     sink = RerunSink(DEMO_SITE, path=path, serve=("127.0.0.1", 0))
     made = pictures(30.0)
-    for picture in made:
-        sink.write(picture)
+    write_all(sink, made)
     assert sink.dropped > 0
     go_on.set()
     sink.close()
     alone = tmp_path / "alone.rrd"
     other = RerunSink(DEMO_SITE, path=alone)
-    for picture in made:
-        other.write(picture)
+    write_all(other, made)
     other.close()
     assert path.stat().st_size == pytest.approx(alone.stat().st_size, rel=0.01)
 
