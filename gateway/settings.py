@@ -129,8 +129,9 @@ class Options:
 
     weighting: Weighting = "bias"
     association: AssociationRule = "default"
-    acceleration_sigma_mps2: float = 2.0  # of the constant-velocity model: white over
-    acceleration_time_s: float = 0.4  # this time, so that sigma^2 x time is its density whatever the step
+    acceleration_sigma_mps2: float = 2.0  # of the constant-velocity model, east and north
+    vertical_acceleration_sigma_mps2: float = 1.0  # aircraft change their climb less than their course
+    acceleration_time_s: float = 0.4  # white over this time: sigma^2 x time is the density, whatever the step
     associate_at: int = 3  # hits in a row before a radar track and an aircraft are one
     association_wait_s: float = 1.0  # how long after a GPS report's validity plots may still bracket it
     history_s: float = 10.0  # later than this is too late

@@ -54,7 +54,7 @@ class Innovation:
 class Motion:
     """How the state moves: white acceleration, and a source error that forgets with a time constant (Gauss-Markov)."""
 
-    acceleration_density: float  # m2/s3 an axis: the variance of velocity grows by this each second
+    acceleration_density: tuple[float, float, float]  # m2/s3 east, north, up: growth of velocity's variance a second
     error_sigma_m: float  # an axis; 0 = the position source is taken to have no constant error
     error_time_constant_s: float = 36000.0
 
@@ -67,8 +67,8 @@ def predict(state: Estimate, elapsed_s: Floats, motion: Motion) -> Estimate:
     t = elapsed_s[:, None, None]
     keep = np.exp(np.abs(t) / -motion.error_time_constant_s)
     carry = _UNCHANGED + t * _VELOCITY_MOVES + keep * _ERROR_STAYS
-    span = np.abs(t) * motion.acceleration_density
-    noise = span * (t * t * _OF_POSITION + t * _OF_BOTH + _OF_VELOCITY)
+    density = np.tile(motion.acceleration_density, 3)[:, None]  # scales rows: each block's rows are east, north, up
+    noise = (np.abs(t) * density) * (t * t * _OF_POSITION + t * _OF_BOTH + _OF_VELOCITY)
     noise += (motion.error_sigma_m**2 * (1.0 - keep * keep)) * _ERROR_STAYS
     mean = (carry @ state.mean[:, :, None])[:, :, 0]
     return Estimate(mean, carry @ state.covariance @ carry.transpose(0, 2, 1) + noise)

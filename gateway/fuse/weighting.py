@@ -38,9 +38,10 @@ class Model:
     @classmethod
     def of(cls, options: Options, position: PositionSource, radars: Mapping[int, RadarFrame]) -> Model:
         """The model that the options and the site's position source ask for."""
-        density = options.acceleration_sigma_mps2**2 * options.acceleration_time_s
+        level = options.acceleration_sigma_mps2**2 * options.acceleration_time_s
+        upright = options.vertical_acceleration_sigma_mps2**2 * options.acceleration_time_s
         error = position.systematic_m / math.sqrt(3.0) if options.weighting == "bias" else 0.0
-        return cls(options.weighting, Motion(density, error), radars)
+        return cls(options.weighting, Motion((level, level, upright), error), radars)
 
     @property
     def memory(self) -> int:
