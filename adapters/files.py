@@ -70,7 +70,7 @@ def _is_tlog(beginning: bytes) -> bool:
             frame = parse(beginning[at + 8 : end])
             good += frame is not None and frame.verdict == "good"
             at, count = end, count + 1
-        if good and (count >= 3 or at == len(beginning)):
+        if good and (count >= 3 or (start == 0 and at == len(beginning))):
             return True
     return False
 

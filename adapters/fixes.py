@@ -33,6 +33,7 @@ GPS_RAW_INT, read_fix = fields(
     "cog",
 )
 SECOND = 10**9
+_LEAST_UNIX_USEC = 10**15
 _FROZEN_NS = 2 * SECOND
 _STALE_NS = 5 * SECOND
 _NEAR_ZERO = 10**7  # 1 degree about (0, 0)
@@ -188,6 +189,12 @@ class Fixes:
             return None, None, None
         horizontal, vertical, velocity = self._accuracies_mm
         return horizontal / 1000 or None, vertical / 1000 or None, velocity / 1000 or None
+
+
+def fix_time(payload: bytes) -> int:
+    """Time since boot (ns) that a GPS_RAW_INT tells by itself; 0 where it tells UTC (by magnitude)."""
+    usec: int = read_fix(payload)[0]
+    return usec * 1000 if usec < _LEAST_UNIX_USEC else 0
 
 
 def _is_place(latitude: int, longitude: int) -> bool:

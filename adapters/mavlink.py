@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from adapters.clock import SECOND, SessionEpoch
-from adapters.fixes import GLOBAL_POSITION_INT, GPS_RAW_INT
+from adapters.fixes import GLOBAL_POSITION_INT, GPS_RAW_INT, fix_time
 from adapters.mavlink_frames import Frame, fields
 from adapters.plans import MISSION_MESSAGES, overheard
 from adapters.vehicles import INVALID_AUTOPILOT, STATIONS, Component, Registry, Vehicle
@@ -143,7 +143,7 @@ class MavlinkObserver:
 
     def _gps_raw(self, heard: _Heard) -> Observations:
         clock, fixes = heard.component.clock, heard.vehicle.fixes
-        at = clock.boot_at(heard.received_at)
+        at = clock.boot_at(heard.received_at) if clock.has_been_heard() else fix_time(heard.payload)
         fresh = fixes.hear_fix(heard.payload, at)
         self._say_fix(heard.vehicle)
         if not fresh or not clock.has_been_heard() or not clock.is_settled(heard.received_at):

@@ -207,7 +207,7 @@ class SequenceCheck:
         elif self.last < 0:
             self.recent = 1
         elif ahead == 0:
-            if message == self.message or not self.moved:  # a radio's two status messages share their number
+            if message == self.message:  # a radio's two status messages share their number
                 counters["duplicate" if self.moved else "unsequenced"] += 1
         elif behind <= _REORDERED:
             seen = self.recent >> behind & 1

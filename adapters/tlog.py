@@ -132,7 +132,7 @@ class TlogReader:
                     continue
                 yield int.from_bytes(data[at : at + 8], "big"), data[at + 8 : end], first
                 at = end
-            data, first = data[at:], False
+            data, first = data[at:], first and at == 0
             if last:
                 return
 

@@ -113,7 +113,10 @@ class Registry:
             vehicle = member.vehicle = self._decide(source, system, member, evidence, received_at, counters)
             if vehicle is None:
                 return None
+            joins = bool(vehicle.sources) and received_at - vehicle.last_heard < _ALIVE_NS
             vehicle.sources.add(source)
+            if joins:  # what told them to be one was heard on the other link
+                return None
         vehicle.last_heard = received_at
         return vehicle
 
@@ -123,10 +126,6 @@ class Registry:
         if member is not None and member.vehicle is not None:
             return member.vehicle
         return next(iter(self._vehicles.get(system, ())), None)
-
-    def all(self) -> list[Vehicle]:
-        """Every vehicle."""
-        return [vehicle for vehicles in self._vehicles.values() for vehicle in vehicles]
 
     def _decide(
         self,

@@ -120,7 +120,8 @@ def _from_landing(told: _Told) -> SiteProposal | None:
     why = (
         f"the landing item of the mission of {told.aircraft}, in the direction of its last leg; altitude from {told_by}"
     )
-    aiming = Runway(landing.latitude_rad, landing.longitude_rad, 0.0, direction, **_SIZE)
+    height = altitude + (told.separation_m() or 0.0)
+    aiming = Runway(landing.latitude_rad, landing.longitude_rad, height, direction, **_SIZE)
     back = RunwayFrame(aiming).geodetic_from_runway((-aiming.aiming_point_x_m, 0.0, 0.0))
     return _proposal(told, (float(back[0]), float(back[1])), altitude, direction, why)
 
