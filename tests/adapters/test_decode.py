@@ -1,7 +1,7 @@
 """Arrivals to what was heard."""
 
 import math
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 
 import pytest
@@ -145,7 +145,7 @@ def test_gps_loss_gives_no_report_until_it_is_back() -> None:
     seconds = [
         (one.valid_at - start) / SECOND for each in heard for one in each.observations if isinstance(one, GpsReport)
     ]
-    gaps = [(earlier, later) for earlier, later in zip(seconds, seconds[1:], strict=False) if later - earlier > 5]
+    gaps = [(earlier, later) for earlier, later in pairwise(seconds) if later - earlier > 5]
     assert len(gaps) == 1
     assert gaps[0] == (pytest.approx(148.0, abs=0.7), pytest.approx(208.4, abs=0.5))
 

@@ -1,5 +1,6 @@
 """What a recording is, told by what is in it."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -103,7 +104,7 @@ def test_a_tlog_is_one_source_with_increasing_stamps() -> None:
     assert [source.kind for source in recording.sources] == ["mavlink"]
     assert {arrival.source for arrival in arrivals} == {4}
     stamps = [arrival.received_at for arrival in arrivals]
-    assert all(later > earlier for earlier, later in zip(stamps, stamps[1:], strict=False))
+    assert all(later > earlier for earlier, later in pairwise(stamps))
     assert all(stamp % 4000 == 0 for stamp in stamps)
     assert len(arrivals) == 2841
 
