@@ -7,6 +7,7 @@ Positions of reports and plots become `Fix` and `Plot`: metres at the runway cen
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median
@@ -20,6 +21,7 @@ from gateway.observation import GpsReport, RadarPlot, RadarStatus, Timing
 from gateway.settings import RadarSite, Site
 
 Floats = NDArray[np.float64]
+Polar = tuple[float, float, float]  # range m, azimuth rad, elevation rad; NaN = not measured
 Ints = NDArray[np.int64]
 
 SECOND = 1_000_000_000
@@ -51,8 +53,8 @@ class Plot:
     received_at: int
     radar: int
     number: int
-    polar: Floats  # (3,)
-    sigma: Floats  # (3,)
+    polar: Polar
+    sigma: Polar
     begins: bool = False  # a plot completed from its neighbours, from which a track starts
 
 
@@ -153,22 +155,17 @@ def place_reports(
 
 def place_plot(plot: RadarPlot, serial: int, radar: RadarSite, correction: Floats) -> Plot:
     """A plot with its radar's correction taken off and the site's sigmas where it gives none."""
-    nan = math.nan
-    polar = np.array(
-        [
-            nan if plot.range_m is None else plot.range_m,
-            nan if plot.azimuth_rad is None else plot.azimuth_rad,
-            nan if plot.elevation_rad is None else plot.elevation_rad,
-        ]
+    measured = (plot.range_m, plot.azimuth_rad, plot.elevation_rad)
+    distance, azimuth, elevation = (
+        math.nan if value is None else value - error for value, error in zip(measured, correction.tolist(), strict=True)
     )
-    sigma = np.array(
-        [
-            plot.range_sigma_m or radar.range_sigma_m,
-            plot.azimuth_sigma_rad or radar.azimuth_sigma_rad,
-            plot.elevation_sigma_rad or radar.elevation_sigma_rad,
-        ]
+    sigma = (
+        plot.range_sigma_m or radar.range_sigma_m,
+        plot.azimuth_sigma_rad or radar.azimuth_sigma_rad,
+        plot.elevation_sigma_rad or radar.elevation_sigma_rad,
     )
-    return Plot(plot.valid_at, serial, plot.received_at, plot.radar, plot.track_number, polar - correction, sigma)
+    polar = (distance, azimuth, elevation)
+    return Plot(plot.valid_at, serial, plot.received_at, plot.radar, plot.track_number, polar, sigma)
 
 
 def radar_from_status(status: RadarStatus, frame: RunwayFrame) -> RadarSite:
@@ -188,38 +185,56 @@ def contradiction(known: RadarSite, said: RadarSite) -> str | None:
     return " and ".join(parts) or None
 
 
-def bracket(plots: Sequence[Plot], at: int, wait_s: float, back_s: float = 3.0) -> tuple[Floats, Floats]:
-    """Range, azimuth, elevation of one radar track at an instant, (3,) and sigmas (3,); NaN where nothing is near.
+def bracket(plots: Sequence[Plot], at: int, wait_s: float, back_s: float = 3.0) -> tuple[Polar, Polar]:
+    """One radar track's range, azimuth, elevation at an instant, and their sigmas; NaN where nothing is near.
 
     `plots` in order of time. Each component is interpolated between the plots on both sides that have it (no later than
     `wait_s` after the instant, no earlier than `back_s` before); extrapolated from the two before it if none follows.
     Sigmas are those of the weights used, so an extrapolation says how bad it is (2.2 to 2.6 times an interpolation).
     Source: 003 2.1.
     """
+    middle = bisect_right(plots, at, key=_at)
     first, last = at - int(back_s * SECOND), at + int(wait_s * SECOND)
-    near = [plot for plot in plots if first <= plot.at <= last]
-    value, sigma = np.full(3, math.nan), np.full(3, math.nan)
-    for component in range(3):
-        having = [plot for plot in near if not math.isnan(plot.polar[component])]
-        before = [plot for plot in having if plot.at <= at]
-        after = next((plot for plot in having if plot.at > at), None)
-        if not before:
-            continue
-        if before[-1].at == at or (after is None and len(before) < 2):
-            if at - before[-1].at > SECOND // 2:
-                continue  # one old plot alone does not say where the target is now
-            value[component], sigma[component] = before[-1].polar[component], before[-1].sigma[component]
-            continue
-        one, other = (before[-1], after) if after is not None else (before[-2], before[-1])
-        if one.at == other.at:
-            continue
-        weight = (at - one.at) / (other.at - one.at)
-        change = other.polar[component] - one.polar[component]
-        if component == 1:
-            change = math.remainder(change, 2.0 * math.pi)
-        value[component] = one.polar[component] + weight * change
-        sigma[component] = math.hypot((1.0 - weight) * one.sigma[component], weight * other.sigma[component])
-    return value, sigma
+    range_, azimuth, elevation = (_component(plots, middle, at, first, last, component) for component in range(3))
+    return (range_[0], azimuth[0], elevation[0]), (range_[1], azimuth[1], elevation[1])
+
+
+def _component(
+    plots: Sequence[Plot], middle: int, at: int, first: int, last: int, component: int
+) -> tuple[float, float]:
+    """One component at an instant and its sigma; `middle` is the first plot after the instant."""
+    before: list[Plot] = []
+    for place in range(middle - 1, -1, -1):
+        if plots[place].at < first or len(before) == 2:
+            break
+        if not math.isnan(plots[place].polar[component]):
+            before.append(plots[place])
+    if not before:
+        return math.nan, math.nan
+    newest = before[0]
+    after = None
+    for place in range(middle, len(plots)):
+        if plots[place].at > last:
+            break
+        if not math.isnan(plots[place].polar[component]):
+            after = plots[place]
+            break
+    if newest.at == at:
+        return newest.polar[component], newest.sigma[component]
+    one, other = (newest, after) if after is not None else (before[-1], newest)
+    if one.at == other.at:  # one old plot alone says where the target is only for a moment
+        near = at - newest.at <= SECOND // 2
+        return (newest.polar[component], newest.sigma[component]) if near else (math.nan, math.nan)
+    weight = (at - one.at) / (other.at - one.at)
+    change = other.polar[component] - one.polar[component]
+    if component == 1:
+        change = math.remainder(change, 2.0 * math.pi)
+    sigma = math.hypot((1.0 - weight) * one.sigma[component], weight * other.sigma[component])
+    return one.polar[component] + weight * change, sigma
+
+
+def _at(plot: Plot) -> int:
+    return plot.at
 
 
 def draw(fixes: Sequence[Fix], plots: Sequence[Plot], frame: RunwayFrame, radars: Mapping[int, RadarFrame]) -> Aligned:

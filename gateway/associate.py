@@ -17,18 +17,22 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.align import SECOND, Fix, Plot, bracket
+from gateway.align import SECOND, Fix, Plot, Polar, bracket
 from gateway.frames import RadarFrame, RunwayFrame, polar_from_xyz, turn
 from gateway.settings import Options, Site
-from gateway.track import Key, RadarTracks, name_of
+from gateway.track import GREATEST_SPEED_MPS, Key, Place, RadarTracks, name_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+GATE_SIGMAS = 3.0
 FAST_CHECKS_S = 2.0  # checks closer together than this need FAST_HITS of them: their errors are alike
 FAST_HITS = 5
 SILENT_S = 3.0  # a radar track without plots for this long gives its aircraft free
 RIVAL_RATIO = 1.5  # a pair is taken only if every rival's mean distance is this many times its own
+
+
+NOWHERE: Polar = (math.nan, math.nan, math.nan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +68,8 @@ class Comparison:
     key: Key
     hit: bool
     distance: float  # mean square of difference / gate over the compared components
-    difference: Floats  # (3,)
-    gate: Floats  # (3,)
+    difference: Polar
+    gate: Polar
 
     def differs(self, other: Comparison) -> bool:
         """Whether anything that the counters see is different."""
@@ -117,6 +121,9 @@ class Check:
     def order(self) -> tuple[int, str]:
         """Checks are folded in order of validity."""
         return self.fix.at, self.fix.aircraft
+
+
+Compared = tuple[Fix, tuple[Comparison, ...], frozenset[Key]]  # a report, its comparisons, the tracks with plots then
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,24 +180,30 @@ def check_due(state: Association, tracks: RadarTracks, setting: Setting) -> Asso
             place, next(i for i, (a, b) in enumerate(zip((*kept, None), state.checks, strict=False)) if a is not b)
         )
     before = state.checks[place].before if place < len(state.checks) else state.ledger
-    tail = sorted((fix, *(check.fix for check in kept[place:])), key=lambda f: (f.at, f.aircraft))
-    return _fold(replace(state, waiting=rest, checks=kept[:place], ledger=before), tail, tracks, setting)
+    tail: list[Compared] = [(check.fix, check.comparisons, check.alive) for check in kept[place:]]
+    own = bisect_left(kept, (fix.at, fix.aircraft), key=lambda check: check.order) - place
+    tail.insert(own, (fix, *_compare(fix, tracks, setting)))
+    return _fold(replace(state, waiting=rest, checks=kept[:place], ledger=before), tail, setting)
 
 
 def check_again(state: Association, plot: Plot, tracks: RadarTracks, setting: Setting) -> Association:
-    """The same after a plot that came when a check it touches was done already."""
+    """The same after a plot that came when checks it touches were done already."""
     wait = int(setting.options.association_wait_s * SECOND)
     first = bisect_left(state.checks, (plot.at - wait, ""), key=lambda check: check.order)
     last = bisect_right(state.checks, (plot.at + int(SILENT_S * SECOND), "\uffff"), key=lambda check: check.order)
+    renewed: dict[int, Compared] = {}
     for place in range(first, last):
         check = state.checks[place]
-        comparisons, alive = _compare(check.fix, tracks, check.before, setting)
+        comparisons, alive = _compare(check.fix, tracks, setting)
         same = len(comparisons) == len(check.comparisons) and alive == check.alive
-        if same and not any(new.differs(old) for new, old in zip(comparisons, check.comparisons, strict=True)):
-            continue
-        tail = [later.fix for later in state.checks[place:]]
-        return _fold(replace(state, checks=state.checks[:place], ledger=check.before), tail, tracks, setting)
-    return state
+        if not same or any(new.differs(old) for new, old in zip(comparisons, check.comparisons, strict=True)):
+            renewed[place] = (check.fix, comparisons, alive)
+    if not renewed:
+        return state
+    start = min(renewed)
+    later = range(start, len(state.checks))
+    tail = [renewed.get(i, (state.checks[i].fix, state.checks[i].comparisons, state.checks[i].alive)) for i in later]
+    return _fold(replace(state, checks=state.checks[:start], ledger=state.checks[start].before), tail, setting)
 
 
 def pruned(state: Association, before: int) -> Association:
@@ -239,82 +252,74 @@ def _latest_index(spans: Sequence[Span], key: Key) -> int:
     return max((span.index for span in spans if span.key == key), default=0)
 
 
-def _compare(
-    fix: Fix, tracks: RadarTracks, ledger: Ledger, setting: Setting
-) -> tuple[tuple[Comparison, ...], frozenset[Key]]:
-    """One report against every radar track with plots near its time; far ones only if a counter knows them.
+def _compare(fix: Fix, tracks: RadarTracks, setting: Setting) -> tuple[tuple[Comparison, ...], frozenset[Key]]:
+    """One report against every radar track with plots near its time that is not far away; and which have such plots.
 
     Source: 003 2.3 eq 6. Deviation: sigma also holds the allowed systematic error of the position source.
     """
     wait = int(setting.options.association_wait_s * SECOND)
+    first, last = fix.at - int(SILENT_S * SECOND), fix.at + wait
     alive, found = set(), []
-    places: dict[int, tuple[Floats, Floats]] = {}
+    seen = {number: _seen_from(fix, radar, setting) for number, radar in setting.radars.items()}
     for key, plots in tracks.plots.items():
-        if (
-            plots[0].at > fix.at + wait
-            or plots[-1].at < fix.at - int(SILENT_S * SECOND)
-            or key[0] not in setting.radars
-        ):
+        if plots[0].at > last or plots[-1].at < first or key[0] not in seen:
             continue
         alive.add(key)
-        if key[0] not in places:
-            places[key[0]] = _seen_from(fix, setting.radars[key[0]], setting)
-        there, spread = places[key[0]]
-        if (fix.aircraft, key) not in ledger.counts and _is_far(there, spread, plots):
-            continue
-        value, sigma = bracket(plots, fix.at, setting.options.association_wait_s)
-        gate = 3.0 * np.sqrt(sigma * sigma + spread * spread)
-        difference = value - there
-        difference[1] = math.remainder(difference[1], 2.0 * math.pi) if not math.isnan(difference[1]) else math.nan
-        found.append(_judge(key, difference, gate, setting.options.association))
+        there, spread = seen[key[0]]
+        if not _is_far(fix.at, there, spread, tracks.places[key]):
+            value, sigma = bracket(plots, fix.at, setting.options.association_wait_s)
+            found.append(_judge(key, value, sigma, there, spread, setting.options.association))
     return tuple(found), frozenset(alive)
 
 
-def _seen_from(fix: Fix, radar: RadarFrame, setting: Setting) -> tuple[Floats, Floats]:
-    """A report's place as a radar would measure it, and its sigma there; both (3,) in m, rad, rad."""
-    there = polar_from_xyz(radar.from_enu(fix.enu_m))
+def _seen_from(fix: Fix, radar: RadarFrame, setting: Setting) -> tuple[Polar, Polar]:
+    """A report's place as a radar would measure it, and its sigma there, systematic error included."""
+    distance, azimuth, elevation = polar_from_xyz(radar.from_enu(fix.enu_m)).tolist()
     sigma_m = math.hypot(float(fix.sigma_m[0]), setting.site.position.systematic_m)
     upright_m = math.hypot(float(fix.sigma_m[2]), setting.site.position.systematic_m)
-    distance = max(float(there[0]), 1.0)
-    level = max(distance * math.cos(float(there[2])), 1.0)
-    return there, np.array([sigma_m, sigma_m / level, upright_m / distance])
+    level = max(distance * math.cos(elevation), 1.0)
+    return (distance, azimuth, elevation), (sigma_m, sigma_m / level, upright_m / max(distance, 1.0))
 
 
-def _is_far(there: Floats, spread: Floats, plots: Sequence[Plot]) -> bool:
+def _is_far(at: int, there: Polar, spread: Polar, place: Place) -> bool:
     """Whether a radar track's latest range and azimuth leave no chance of a hit, so that nothing need be interpolated."""
-    for component in (0, 1):
-        last = next((plot for plot in reversed(plots[-8:]) if not math.isnan(plot.polar[component])), None)
-        if last is None:
-            continue
-        away = abs(float(last.polar[component]) - float(there[component]))
-        if component:
-            away = abs(math.remainder(away, 2.0 * math.pi))
-        moved = 600.0 * 6.0 / (max(float(there[0]), 300.0) if component else 1.0)
-        if away > moved + 4.0 * float(spread[component]) + 4.0 * float(last.sigma[component]):
-            return True
-    return False
+    moved_m = GREATEST_SPEED_MPS * (abs(at - place.at) / SECOND + 1.0)
+    away_m = abs(place.range_m - there[0])
+    if away_m > moved_m + 4.0 * (spread[0] + place.range_sigma_m):
+        return True
+    away = (
+        abs(math.remainder(place.azimuth_rad - there[1], 2.0 * math.pi))
+        if place.azimuth_rad == place.azimuth_rad
+        else 0.0
+    )
+    return away > moved_m / max(there[0], 300.0) + 4.0 * (spread[1] + place.azimuth_sigma_rad)
 
 
-def _judge(key: Key, difference: Floats, gate: Floats, rule: str) -> Comparison:
+def _judge(key: Key, value: Polar, sigma: Polar, there: Polar, spread: Polar, rule: str) -> Comparison:
     """Hit or miss. `literal`: range and (azimuth or elevation); `default`: all that are present, at least two.
 
     Source: 003 2.3 eq 7. Deviation: `default`, because eq 7 takes an aircraft 3 degrees abeam for the one on final.
     """
-    compared = ~np.isnan(difference)
-    inside = compared & (np.abs(difference) <= gate)
+    range_, azimuth, elevation = (value[component] - there[component] for component in range(3))
+    if not math.isnan(azimuth):
+        azimuth = math.remainder(azimuth, 2.0 * math.pi)
+    difference = (range_, azimuth, elevation)
+    wide, left, up = (GATE_SIGMAS * math.hypot(sigma[component], spread[component]) for component in range(3))
+    gate = (wide, left, up)
+    ratios = [abs(off) / limit for off, limit in zip(difference, gate, strict=True)]  # NaN where not compared
+    compared = [ratio for ratio in ratios if not math.isnan(ratio)]
     if rule == "literal":
-        hit = bool(inside[0] and (inside[1] or inside[2]))
+        hit = ratios[0] <= 1.0 and (ratios[1] <= 1.0 or ratios[2] <= 1.0)
     else:
-        hit = int(compared.sum()) >= 2 and bool(inside[compared].all())
-    ratio = difference[compared] / gate[compared]
-    return Comparison(key, hit, float((ratio * ratio).mean()) if compared.any() else math.inf, difference, gate)
+        hit = len(compared) >= 2 and max(compared) <= 1.0
+    distance = sum(ratio * ratio for ratio in compared) / len(compared) if compared else math.inf
+    return Comparison(key, hit, distance, difference, gate)
 
 
-def _fold(state: Association, fixes: Sequence[Fix], tracks: RadarTracks, setting: Setting) -> Association:
+def _fold(state: Association, compared: Sequence[Compared], setting: Setting) -> Association:
     """The state after some more checks, in order of validity."""
     checks, ledger = list(state.checks), state.ledger
-    for fix in fixes:
-        comparisons, alive = _compare(fix, tracks, ledger, setting)
+    for fix, comparisons, alive in compared:
         after, changes = _count(ledger, fix, comparisons, alive, setting)
         checks.append(Check(fix, comparisons, alive, ledger, after, changes))
         ledger = after
@@ -329,7 +334,11 @@ def _count(
     gap_s = (fix.at - ledger.checked_at[aircraft]) / SECOND if aircraft in ledger.checked_at else math.inf
     full = setting.options.associate_at if gap_s >= FAST_CHECKS_S else max(setting.options.associate_at, FAST_HITS)
     here = tuple(turn(setting.frame.runway_from_enu, fix.enu_m).tolist())
-    for comparison in comparisons:
+    near = {comparison.key for comparison in comparisons}
+    far = [
+        Comparison(key, False, math.inf, NOWHERE, NOWHERE) for _, key in _of(counts, aircraft) if key in alive - near
+    ]
+    for comparison in (*comparisons, *far):
         pair = (aircraft, comparison.key)
         old = counts.get(pair, Count(0, 0.0, 0))
         if comparison.hit:
@@ -364,6 +373,10 @@ def _count(
         begun = [(key, owner) for key, owner in pairs.items() if key not in now]
         spans = (*gone, *(Span(key, owner, fix.at, None, _latest_index(gone, key) + 1) for key, owner in begun))
     return Ledger(counts, pairs, spans, {**ledger.checked_at, aircraft: fix.at}), tuple(changes)
+
+
+def _of(counts: Mapping[tuple[str, Key], Count], aircraft: str) -> list[tuple[str, Key]]:
+    return [pair for pair in counts if pair[0] == aircraft]
 
 
 def _assign(

@@ -28,10 +28,37 @@ class Tracked:
 
 
 @dataclass(frozen=True, slots=True)
+class Place:
+    """Where a radar track was lately: the newest range and azimuth that were measured (NaN = never), for a coarse look."""
+
+    at: int
+    range_m: float
+    azimuth_rad: float
+    range_sigma_m: float
+    azimuth_sigma_rad: float
+
+    def then(self, plot: Plot) -> Place:
+        """The same after one more plot; one that is older changes nothing."""
+        if plot.at < self.at:
+            return self
+        range_m, azimuth_rad, _ = plot.polar
+        known = math.isnan(range_m), math.isnan(azimuth_rad)
+        # The time is that of the older of the two, so that what may have moved since is never underestimated.
+        return Place(
+            self.at if any(known) else plot.at,
+            self.range_m if known[0] else range_m,
+            self.azimuth_rad if known[1] else azimuth_rad,
+            plot.sigma[0],
+            plot.sigma[1],
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class RadarTracks:
     """The recent plots of every radar track, in order of time."""
 
     plots: Mapping[Key, tuple[Plot, ...]] = field(default_factory=dict)
+    places: Mapping[Key, Place] = field(default_factory=dict)
     episode: Mapping[tuple[int, int], int] = field(default_factory=dict)  # the present one of each number
 
     def after(self, plot: Plot) -> tuple[RadarTracks, Key]:
@@ -50,14 +77,18 @@ class RadarTracks:
         elif number not in episodes:
             episodes = {**episodes, number: present}
         place = bisect_right(known, (plot.at, plot.serial), key=lambda other: (other.at, other.serial))
-        return RadarTracks({**self.plots, key: (*known[:place], plot, *known[place:])}, episodes), key
+        before = self.places.get(key) if known else None
+        place_now = (before or Place(plot.at, math.nan, math.nan, *plot.sigma[:2])).then(plot)
+        plots = {**self.plots, key: (*known[:place], plot, *known[place:])}
+        return RadarTracks(plots, {**self.places, key: place_now}, episodes), key
 
     def pruned(self, before: int) -> RadarTracks:
         """The same without plots older than an instant; tracks without plots are forgotten."""
         if all(plots[0].at >= before for plots in self.plots.values()):
             return self
         kept = {key: tuple(plot for plot in plots if plot.at >= before) for key, plots in self.plots.items()}
-        return replace(self, plots={key: plots for key, plots in kept.items() if plots})
+        alive = {key: plots for key, plots in kept.items() if plots}
+        return replace(self, plots=alive, places={key: self.places[key] for key in alive})
 
 
 def table(tracks: RadarTracks, untracked: int) -> Tracked:

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from gateway import align, associate, fuse, predict, track
 from gateway.align import SECOND, Fix, Geoid, Plot
-from gateway.associate import Change
+from gateway.associate import Association, Change, Setting
 from gateway.frames import RadarFrame
-from gateway.fuse import Ended
+from gateway.fuse import Ended, Lanes, Scene
 from gateway.fuse.filtering import Job
 from gateway.fuse.rows import Row
 from gateway.fuse.weighting import Model
@@ -95,7 +95,7 @@ class Work:
             back_s = (self.now - now) / SECOND
             text = f"the session's time went back by {back_s:.0f} s: every track starts again, under its number"
             self.events.append(Event(now, "warning", text))
-        self.lanes, self.tracks, self.association = fuse.emptied(self.lanes), RadarTracks(), associate.Association()
+        self.lanes, self.tracks, self.association = fuse.emptied(self.lanes), RadarTracks(), Association()
         self.now, self.instant = now, now // SECOND * SECOND + SECOND
 
     # align --------------------------------------------------------------------------------------------------------
@@ -154,7 +154,9 @@ class Work:
             self.radars = {**self.radars, status.radar: said}
             self._settle()
             self._see_radars()
-            self.once(f"radar {status.radar} is not in the site file: it is taken to stand where its status says", "info")
+            self.once(
+                f"radar {status.radar} is not in the site file: it is taken to stand where its status says", "info"
+            )
         elif text := align.contradiction(known, said):
             self.once(f"radar {status.radar} says that it {text} than the site file says: the site file is used")
 
@@ -163,7 +165,9 @@ class Work:
             off_m = self.geoid.contradiction_m
             self.once(f"the streams' geoid separation is {off_m:+.0f} m from the site file's: the site file's is used")
         elif self.geoid.site_m is None and not self.geoid.seen_m:
-            self.once("neither site nor stream gives the geoid separation: heights are those above mean sea level", "info")
+            self.once(
+                "neither site nor stream gives the geoid separation: heights are those above mean sea level", "info"
+            )
 
     def _is_timely(self, at: int, source: str) -> bool:
         """Whether an observation falls into the history; if not it is counted, and said once."""
@@ -210,7 +214,7 @@ class Work:
             self.checks += [check for check in after.checks if check.fix is fix]
             self._move(after)
 
-    def _move(self, after: associate.Association) -> None:
+    def _move(self, after: Association) -> None:
         """A new state of association: the plots of pairs made, lost or moved in time change their system tracks."""
         old, self.association = self.association, after
         if after.ledger.spans == old.ledger.spans:
@@ -246,7 +250,7 @@ class Work:
             if not fuse.contains(self.lanes, lane, plot):  # a pair that changed just now may have taken it along
                 self._work_in(*fuse.take_plot(self.lanes, plot, key, scene))
 
-    def _work_in(self, lanes: fuse.Lanes, job: Job | None) -> None:
+    def _work_in(self, lanes: Lanes, job: Job | None) -> None:
         """A job, to be worked together with those of other tracks."""
         self.lanes = lanes
         if job is not None:
@@ -263,11 +267,11 @@ class Work:
         if outliers:
             self.count("outliers, their pull bounded", outliers)
 
-    def _scene(self) -> fuse.Scene:
-        return fuse.Scene(self.tracks, self.association.ledger.spans, self.options)
+    def _scene(self) -> Scene:
+        return Scene(self.tracks, self.association.ledger.spans, self.options)
 
-    def _setting(self) -> associate.Setting:
-        return associate.Setting(self.site, self.options, self.frame, self.radar_frames)
+    def _setting(self) -> Setting:
+        return Setting(self.site, self.options, self.frame, self.radar_frames)
 
     def _see_radars(self) -> None:
         self.radar_frames = {number: RadarFrame.of(radar, self.frame) for number, radar in self.radars.items()}

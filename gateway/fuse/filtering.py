@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.align import SECOND, Fix, Plot
+from gateway.align import SECOND, Fix, Plot, Polar
 from gateway.estimators.kalman import Estimate, predict
 from gateway.fuse.weighting import (
     Model,
@@ -22,7 +22,8 @@ from gateway.fuse.weighting import (
 
 Floats = NDArray[np.float64]
 Measure = Fix | Plot
-Neighbour = Callable[[Fix], tuple[int, Floats, Floats] | None]  # radar, polar (3,), sigma (3,) at a fix's time
+Near = tuple[int, Polar, Polar]  # radar, range, azimuth, elevation, and their sigmas
+Neighbour = Callable[[Fix], Near | None]  # what a track's radar measured at a report's time
 
 NEVER = -(1 << 62)
 
@@ -115,7 +116,7 @@ def _stacked(bases: Sequence[Event], model: Model) -> tuple[Floats, Floats, Floa
     return mean, covariance, memory
 
 
-def _group(measure: Measure, near: tuple[int, Floats, Floats] | None) -> tuple[str, int]:
+def _group(measure: Measure, near: Near | None) -> tuple[str, int]:
     """Which measurements can be worked in together: those with one formula and one radar."""
     if isinstance(measure, Plot):
         return "plot", measure.radar
@@ -127,7 +128,7 @@ def _update(
     radar: int,
     state: Estimate,
     measures: Sequence[Measure],
-    near: Sequence[tuple[int, Floats, Floats] | None],
+    near: Sequence[Near | None],
     memory: Floats,
     model: Model,
 ) -> tuple[Estimate, NDArray[np.bool_], Floats]:
@@ -152,7 +153,7 @@ def _update(
 
 def _start(measure: Measure, model: Model) -> Estimate:
     if isinstance(measure, Plot):
-        return start_from_plots(measure.polar[None], measure.sigma[None], measure.radar, model)
+        return start_from_plots(np.array([measure.polar]), np.array([measure.sigma]), measure.radar, model)
     velocity = measure.velocity_mps[None]
     sigma = np.array([measure.velocity_sigma_mps])
     return start_from_fixes(measure.enu_m[None], measure.sigma_m[None], velocity, sigma, model)

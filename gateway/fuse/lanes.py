@@ -13,11 +13,9 @@ from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from gateway.align import SECOND, Fix, Plot, bracket
 from gateway.associate import Span, aircraft_of, ordinal_of
-from gateway.fuse.filtering import Event, Floats, Job, Measure, Neighbour, rank
+from gateway.fuse.filtering import Event, Job, Measure, Near, Neighbour, rank
 from gateway.settings import Options
 from gateway.track import Key, RadarTracks, name_of
 
@@ -108,13 +106,13 @@ class Scene:
     def neighbour(self, lane: Lane) -> Neighbour:
         """The plot of this lane's radar track at a report's time, for the literal weighting."""
 
-        def at_time_of(fix: Fix) -> tuple[int, Floats, Floats] | None:
+        def at_time_of(fix: Fix) -> Near | None:
             for span in self.spans:
                 if span.aircraft != lane.aircraft or aircraft_of(self.spans, span.key, fix.at) != lane.aircraft:
                     continue
                 plots = self.tracks.plots.get(span.key, ())
                 value, sigma = bracket(plots, fix.at, self.options.association_wait_s)
-                if not np.isnan(value).all():
+                if not all(map(math.isnan, value)):
                     return span.key[0], value, sigma
             return None
 
@@ -322,7 +320,7 @@ def begin(plots: Sequence[Plot]) -> list[Measure]:
     """The measurements of a radar track from the first one that can start a state: complete, or completed by neighbours."""
     for place in range(LEAST_PLOTS - 1, len(plots)):
         plot = plots[place]
-        polar, sigma = plot.polar.copy(), plot.sigma.copy()
+        polar, sigma = list(plot.polar), list(plot.sigma)
         for component in range(3):
             if not math.isnan(polar[component]):
                 continue
@@ -330,10 +328,13 @@ def begin(plots: Sequence[Plot]) -> list[Measure]:
                 if not math.isnan(other.polar[component]) and plot.at - other.at <= COMPLETED_WITHIN_S * SECOND:
                     polar[component] = other.polar[component]
                     moved_m = 150.0 * (plot.at - other.at) / SECOND
-                    sigma[component] += moved_m if component == 0 else moved_m / max(float(polar[0]), 300.0)
+                    sigma[component] += moved_m if component == 0 else moved_m / max(polar[0], 300.0)
                     break
-        if not np.isnan(polar).any():
-            return [replace(plot, polar=polar, sigma=sigma, begins=True), *plots[place + 1 :]]
+        if not any(map(math.isnan, polar)):
+            first = replace(
+                plot, polar=(polar[0], polar[1], polar[2]), sigma=(sigma[0], sigma[1], sigma[2]), begins=True
+            )
+            return [first, *plots[place + 1 :]]
     return []
 
 

@@ -8,7 +8,7 @@ times from t = 20 s, in three dimensions. Source: 003, 3.1 and 3.2.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from gateway import associate
 from gateway.align import SECOND, Fix, Plot, bracket
 from gateway.frames import RadarFrame, RunwayFrame
-from gateway.fuse.filtering import Event, Job, rank, run as run_filter
+from gateway.fuse.filtering import Event, Job, Near, Neighbour, rank
+from gateway.fuse.filtering import run as run_filter
 from gateway.fuse.lanes import begin
 from gateway.fuse.weighting import Model
 from gateway.settings import Options, Weighting
-from gateway.track import RadarTracks
+from gateway.track import Key, Place, RadarTracks
 from sim.cases import Case, case_003
 from sim.sensors import PlotsMeasured
 from sim.studies import Progress, Study, Table, silent
@@ -104,7 +105,7 @@ def measures_of(case: Case, index: int) -> Measures:
 
 def measure_accuracy(case: Case, method: str) -> Accuracy:
     """RMSE of one method over all runs of a case; a method is a weighting, "radar alone" or "GPS alone"."""
-    weighting: Weighting = method if method in WEIGHTINGS else "covariance"  # type: ignore[assignment]
+    weighting: Weighting = method if method in WEIGHTINGS else "covariance"
     options = Options(weighting=weighting)
     frame = RunwayFrame(case.site.runway)
     radars = {radar.number: RadarFrame.of(radar, frame) for radar in case.site.radars}
@@ -134,9 +135,7 @@ def measure_accuracy(case: Case, method: str) -> Accuracy:
     def rmse(chosen: NDArray[np.bool_]) -> float:
         return float(np.sqrt(square[:, chosen].mean()))
 
-    first, second, third = (
-        rmse(counted & (case.along_m <= far) & (case.along_m > near)) for far, near in BANDS_M
-    )
+    first, second, third = (rmse(counted & (case.along_m <= far) & (case.along_m > near)) for far, near in BANDS_M)
     return Accuracy(rmse(counted), (first, second, third), error_found)
 
 
@@ -169,7 +168,7 @@ def associated_ranges(heard: Measures, setting: associate.Setting) -> list[float
     return found
 
 
-def _checks(heard: Measures, setting: associate.Setting, until_s: float):  # type: ignore[no-untyped-def]
+def _checks(heard: Measures, setting: associate.Setting, until_s: float) -> Iterator[tuple[associate.Association, Fix]]:
     """Each report checked in turn against the plots about its time; yields the state after it and the report."""
     state = associate.Association()
     margin = 5 * SECOND
@@ -183,9 +182,19 @@ def _checks(heard: Measures, setting: associate.Setting, until_s: float):  # typ
             first, last = np.searchsorted(times[key], (fix.at - margin, fix.at + margin))
             if first < last:
                 near[key] = plots[first:last]
-        state = associate.check_due(associate.await_plots(state, fix), RadarTracks(near), setting)
+        state = associate.check_due(associate.await_plots(state, fix), RadarTracks(near, _places(near)), setting)
         state = associate.pruned(state, fix.at - 10 * SECOND)
         yield state, fix
+
+
+def _places(near: Mapping[Key, Sequence[Plot]]) -> dict[Key, Place]:
+    """Where each radar track was lately, as `track` would know it."""
+    places = {}
+    for key, plots in near.items():
+        places[key] = Place(plots[0].at, math.nan, math.nan, *plots[0].sigma[:2])
+        for plot in plots:
+            places[key] = places[key].then(plot)
+    return places
 
 
 def _association_table(runs: int, seed: int) -> tuple[Table, dict[str, float]]:
@@ -235,24 +244,24 @@ def _beside(case: Case, index: int, alone: bool) -> Measures:
     return replace(heard, plots=()) if alone else heard
 
 
-def _neighbour(heard: Measures, options: Options):  # type: ignore[no-untyped-def]
+def _neighbour(heard: Measures, options: Options) -> Neighbour:
     """The target's plots interpolated at a report's time, for the literal weighting."""
     times = np.array([plot.at for plot in heard.plots], dtype=np.int64)
 
-    def at_time_of(fix: Fix) -> tuple[int, Floats, Floats] | None:
+    def at_time_of(fix: Fix) -> Near | None:
         first, last = np.searchsorted(times, (fix.at - 5 * SECOND, fix.at + 5 * SECOND))
         value, sigma = bracket(heard.plots[first:last], fix.at, options.association_wait_s)
-        return None if np.isnan(value).all() else (TARGET[0], value, sigma)
+        return None if all(map(math.isnan, value)) else (TARGET[0], value, sigma)
 
     return at_time_of
 
 
 def _plots(case: Case, measured: PlotsMeasured, index: int, number: int) -> tuple[Plot, ...]:
     antenna = case.site.radars[0]
-    sigma = np.array([antenna.range_sigma_m, antenna.azimuth_sigma_rad, antenna.elevation_sigma_rad])
+    sigma = (antenna.range_sigma_m, antenna.azimuth_sigma_rad, antenna.elevation_sigma_rad)
     at = [_instant(second) for second in case.plot_s]
     seen = measured.seen[index]
-    polar = measured.polar[index]
+    polar = [(row[0], row[1], row[2]) for row in measured.polar[index].tolist()]
     return tuple(Plot(at[i], i, at[i], 1, number, polar[i], sigma) for i in range(len(at)) if seen[i])
 
 
