@@ -151,7 +151,7 @@ def positions_at(events: Sequence[Event], time_s: Floats) -> Floats:
 
 def association_times(heard: Measures, setting: associate.Setting, until_s: float = math.inf) -> tuple[int, int] | None:
     """When the target's plots became the aircraft: (heard at, valid since) in ns, or None if never before `until_s`."""
-    for state, fix in _checks(heard, setting, until_s):
+    for state, fix in checks(heard, setting, until_s):
         if state.ledger.pairs.get(TARGET) == AIRCRAFT:
             wait = int(setting.options.association_wait_s * SECOND)
             return max(fix.received_at, fix.at + wait), fix.at
@@ -161,14 +161,14 @@ def association_times(heard: Measures, setting: associate.Setting, until_s: floa
 def associated_ranges(heard: Measures, setting: associate.Setting) -> list[float]:
     """How far (m) the aircraft was from the radar at each check at which the aircraft beside it was taken for it."""
     found = []
-    for state, fix in _checks(heard, setting, math.inf):
+    for state, fix in checks(heard, setting, math.inf):
         if state.ledger.pairs.get(BESIDE) == AIRCRAFT:
             radar = setting.radars[BESIDE[0]]
             found.append(float(np.linalg.norm(radar.from_enu(fix.enu_m))))
     return found
 
 
-def _checks(heard: Measures, setting: associate.Setting, until_s: float) -> Iterator[tuple[associate.Association, Fix]]:
+def checks(heard: Measures, setting: associate.Setting, until_s: float) -> Iterator[tuple[associate.Association, Fix]]:
     """Each report checked in turn against the plots about its time; yields the state after it and the report."""
     state = associate.Association()
     margin = 5 * SECOND
