@@ -6,6 +6,7 @@ sentence what is wrong, in which line, and what to do.
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import tomllib
@@ -479,7 +480,8 @@ def format_site(site: Site) -> str:
 
 
 def _escaped(text: str) -> str:
-    return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ")
+    """As the inside of a TOML basic string, control characters included."""
+    return json.dumps(text, ensure_ascii=False)[1:-1].replace("\x7f", "\\u007f")
 
 
 def with_radar(site: Site, radar: RadarSite) -> Site:
