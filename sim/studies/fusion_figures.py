@@ -64,6 +64,11 @@ def _blueprint() -> rrb.Blueprint:
     return rrb.Blueprint(tabs, rrb.TimePanel(timeline="time", state="collapsed"), collapse_panels=True)
 
 
+def _plot(origin: str, name: str, until_s: float) -> rrb.TimeSeriesView:
+    whole = rr.TimeRange(rr.TimeRangeBoundary.absolute(seconds=0.0), rr.TimeRangeBoundary.absolute(seconds=until_s))
+    return rrb.TimeSeriesView(origin=origin, name=name, axis_x=rrb.TimeAxis(view_range=whole))
+
+
 def _series(
     recording: rr.RecordingStream, path: str, time_s: Floats, values: Floats, color: list[int], name: str
 ) -> None:
