@@ -64,8 +64,8 @@ def _blueprint() -> rrb.Blueprint:
     return rrb.Blueprint(tabs, rrb.TimePanel(timeline="time", state="collapsed"), collapse_panels=True)
 
 
-def _plot(origin: str, name: str, until_s: float) -> rrb.TimeSeriesView:
-    whole = rr.TimeRange(rr.TimeRangeBoundary.absolute(seconds=0.0), rr.TimeRangeBoundary.absolute(seconds=until_s))
+def _plot(origin: str, name: str) -> rrb.TimeSeriesView:
+    whole = rrb.TimeRange(rrb.TimeRangeBoundary.infinite(), rrb.TimeRangeBoundary.infinite())
     return rrb.TimeSeriesView(origin=origin, name=name, axis_x=rrb.TimeAxis(view_range=whole))
 
 
