@@ -106,8 +106,11 @@ class Work:
         for observation in arrival.observations:
             self.serial += 1
             if isinstance(observation, GpsReport):
-                fix, self.geoid = next(self._placed)
+                fix, geoid = next(self._placed)
                 fix = replace(fix, serial=self.serial)
+                if geoid is not self.geoid and geoid.separation_m != self.geoid.separation_m:
+                    self._settle()  # what waits is written with the geoid that was known when it was heard
+                self.geoid = geoid
                 self.fixes.append(fix)
                 self._judge_heights()
                 if observation.timing is not Timing.FOREIGN and self._is_timely(fix.at, fix.aircraft):
@@ -216,10 +219,12 @@ class Work:
 
     def _move(self, after: Association) -> None:
         """A new state of association: the plots of pairs made, lost or moved in time change their system tracks."""
-        old, self.association = self.association, after
+        old = self.association
+        if after.ledger.spans != old.ledger.spans:
+            self._settle()  # what waits is written under the pairs that were known when it was heard
+        self.association = after
         if after.ledger.spans == old.ledger.spans:
             return
-        self._settle()
         self.lanes, jobs = fuse.reroute(self.lanes, old.ledger.spans, self._scene())
         self.jobs = {job.track: job for job in jobs}
         self._settle()
