@@ -22,6 +22,7 @@ import rerun.blueprint as rrb
 from gateway.sinks.scene.entry import Always, Entry, send
 
 BATCHES_WAITING = 64  # for a viewer that stands still: about 25 s of them, then they are dropped
+FLUSH_S = 10.0  # without a limit a flush of a file that could not grow any more waits for ever
 STOP_S = 5.0  # a viewer that stands still does not hold up the end of the session for longer
 
 
@@ -63,7 +64,7 @@ class FileFeed:
 
     def _flush(self) -> None:
         try:
-            self._stream.flush()
+            self._stream.flush(timeout_sec=FLUSH_S)
         except RuntimeError as error:
             self._failed = True
             full = shutil.disk_usage(self._path.parent).free < 1 << 20
