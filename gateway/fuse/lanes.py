@@ -110,7 +110,9 @@ class Scene:
             for span in self.spans:
                 if span.aircraft != lane.aircraft or aircraft_of(self.spans, span.key, fix.at) != lane.aircraft:
                     continue
-                plots = self.tracks.plots.get(span.key, ())
+                # Only plots that are this aircraft's: a late one of those has this report worked again, another has not.
+                known = self.tracks.plots.get(span.key, ())
+                plots = [p for p in known if p.at >= span.since and (span.until is None or p.at < span.until)]
                 value, sigma = bracket(plots, fix.at, self.options.association_wait_s)
                 if not all(map(math.isnan, value)):
                     return span.key[0], value, sigma
