@@ -32,7 +32,7 @@ def blueprint(site: Site, *, modes: bool = False) -> rrb.Blueprint:
             rrb.Vertical(
                 map_view(site),
                 rrb.Tabs(
-                    _plot("Approach, degrees off", ["/approach/angle/**"]),
+                    _plot("Approach, degrees off", ["/approach/angle/**"], rrb.Corner2D.RightTop),
                     _plot(
                         f"Approach, {units.length} off",
                         ["/approach/**", "- /approach/angle/**", "- /approach/distance/**", "- /approach/scope/**"],
@@ -116,11 +116,11 @@ def _log() -> rrb.TextLogView:
     return rrb.TextLogView(origin="/log", name="Log", columns=columns)
 
 
-def _plot(name: str, contents: list[str]) -> rrb.TimeSeriesView:
+def _plot(name: str, contents: list[str], legend: rrb.Corner2D = rrb.Corner2D.LeftBottom) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         origin="/",
         name=name,
         contents=contents,
         axis_x=rrb.TimeAxis(view_range=_RECENT),
-        plot_legend=rrb.PlotLegend(visible=True),
+        plot_legend=rrb.PlotLegend(legend),
     )

@@ -111,11 +111,13 @@ class RerunSink:
             *self._tracks.entries(flights),
             *self._approach.entries(flights),
             *self._predict.entries(pictures, flights),
-            *self._stages.entries(pictures, flights),
+            *self._stages.entries(pictures, flights, self._flights.newest),
         ]
-        for ended in (ended for picture in pictures for ended in picture.fuse.ended):
-            for scene in (self._flights, self._tracks, self._predict):
-                scene.forget(ended.track)
+        for picture in pictures:
+            for ended in picture.fuse.ended:
+                self._flights.end(ended.track, picture.now)
+                self._predict.end(ended.track, picture.now)
+                self._tracks.forget(ended.track)
         self._send(entries)
 
     def _send(self, entries: list[Entry]) -> None:

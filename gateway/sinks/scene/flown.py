@@ -94,13 +94,17 @@ class Flights:
             )  # fmt: skip
         return found
 
-    def forget(self, track: int) -> None:
-        """A track ended; its number is never used again."""
-        self._newest.pop(track, None)
+    def newest(self, track: int) -> int:
+        """The time of the newest row of a track, ns; long ago for one without rows."""
+        return self._newest.get(track, BEFORE_ALL)
+
+    def end(self, track: int, at: int) -> None:
+        """A track ended: rows of it that come later, and are older, are not drawn any more."""
+        self._newest[track] = max(self.newest(track), at)
 
     def _new_rows(self, track: int, index: NDArray[np.intp], time: Ints) -> NDArray[np.intp]:
         """Those rows, as they were written, that do not go back behind what was drawn before them."""
-        newest = np.maximum.accumulate(np.concatenate([[self._newest.get(track, BEFORE_ALL)], time[index]]))
+        newest = np.maximum.accumulate(np.concatenate([[self.newest(track)], time[index]]))
         self._newest[track] = int(newest[-1])
         return index[time[index] >= newest[:-1]]
 

@@ -87,9 +87,9 @@ class PredictScene:
             entries += self._rows(track, told)
         return entries
 
-    def forget(self, track: int) -> None:
-        """A track ended; its number is never used again."""
-        self._newest.pop(track, None)
+    def end(self, track: int, at: int) -> None:
+        """A track ended: what was predicted for it until then is not drawn any more."""
+        self._newest[track] = max(self._newest.get(track, BEFORE_ALL), at)
         self._here.pop(track, None)
 
     def _made(self, predicted: Predicted, known: dict[int, Flown]) -> list[tuple[int, int, list[Floats]]]:

@@ -17,9 +17,12 @@ Floats = NDArray[np.float64]
 
 
 def approach_reach_m(site: Site) -> float:
-    """How far out the approach is drawn: as far as the radars see, but at most 50 km; 20 km where there is none."""
+    """How far out the approach is drawn: as far as the radars see, but at most 50 km.
+
+    Where there is no radar, ten lengths of the runway: a model's strip has short approaches.
+    """
     ranges = [radar.maximum_range_m for radar in site.radars]
-    return min(max(ranges), 50_000.0) if ranges else 20_000.0
+    return min(max(ranges, default=10.0 * site.runway.length_m), 50_000.0)
 
 
 class SiteScene:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -40,8 +40,10 @@ class StageScene:
         self._named: set[str] = set()
         self._sources: dict[int, set[str]] = {}
 
-    def entries(self, pictures: Sequence[Picture], flights: Sequence[Flown]) -> list[Entry]:
-        """What these pictures add."""
+    def entries(
+        self, pictures: Sequence[Picture], flights: Sequence[Flown], newest: Callable[[int], int]
+    ) -> list[Entry]:
+        """What these pictures add; `newest` gives the time of a track's last row."""
         for flown in flights:
             names = {name for name in flown.aircraft if name}
             names |= {name for text in flown.radar_track if text for name in text.split()}
@@ -56,7 +58,7 @@ class StageScene:
             if picture.now - self._sampled >= SAMPLE_NS:
                 self._sampled = picture.now
                 samples += self._sample(picture)
-            entries += self._ended(picture, log)
+            entries += self._ended(picture, log, newest)
         entries += self._plotted(samples)
         if log:
             log.sort(key=lambda line: line[0])
@@ -130,20 +132,23 @@ class StageScene:
             told.append((entity("health", name), (source.age_s, source.rate_hz, float(source.lost)), titles))
         return [Sample(path, picture.now, picture.step, values, names) for path, values, names in told]
 
-    def _ended(self, picture: Picture, log: list[tuple[int, int, str, str]]) -> list[Entry]:
+    def _ended(
+        self, picture: Picture, log: list[tuple[int, int, str, str]], newest: Callable[[int], int]
+    ) -> list[Entry]:
         """A track that ended leaves the scene, with what its sources said, and the log says so."""
         entries: list[Entry] = []
         for ended in picture.fuse.ended:
             text = f"track {ended.track} ended: {ended.reason}"
             if not any(f"track {ended.track} ended" in event.text for event in picture.events):
                 log.append((ended.at, picture.step, text, "info"))
+            gone = max(ended.at, picture.now, newest(ended.track))  # the last rows can be newer than the reason to end
             paths = [entity(root, ended.track) for root in ("fuse", "predict", "approach")]
             others = {name for track, names in self._sources.items() if track != ended.track for name in names}
             for name in sorted(self._sources.pop(ended.track, set()) - others):
                 paths += [raw_path(name), entity("associate", "point", name)]
-            clear = [once(path, ended.at, picture.step, rr.Clear.columns(is_recursive=[True])) for path in paths]
+            clear = [once(path, gone, picture.step, rr.Clear.columns(is_recursive=[True])) for path in paths]
             state = rr.StateChange.columns(state=["ended"])
-            entries += [*clear, once(entity("fuse", "state", ended.track), ended.at, picture.step, state)]
+            entries += [*clear, once(entity("fuse", "state", ended.track), gone, picture.step, state)]
         return entries
 
 

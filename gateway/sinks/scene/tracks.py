@@ -1,9 +1,8 @@
 """The fused tracks: /fuse/{track} and, beside it, what is plotted of them: /fuse/modes, /fuse/sigma, /fuse/state.
 
-A track is a point that keeps its size on the screen, an aircraft's outline that shows where it points, a
-label, an ellipsoid of three sigma and a trail. The outline is a symbol, not to scale: its length is 1/40 of
-the distance to the runway, held between 40 m and 1.2 km, so that it can be seen at 50 km and does not hide
-the runway.
+A track is a point that keeps its size on the screen, an aircraft's outline that shows where it points, a label, an
+ellipsoid of three sigma and a trail. The outline is a symbol, not to scale: its length is a tenth of the distance
+to the runway, at least 40 m and at most 1/40 of the approach that is drawn: seen from afar, and not hiding the runway.
 """
 
 from __future__ import annotations
@@ -21,6 +20,7 @@ from gateway.sinks.scene import style
 from gateway.sinks.scene.attitude import ellipsoid, quaternion_from_attitude
 from gateway.sinks.scene.entry import Always, Entry, entity, rows
 from gateway.sinks.scene.flown import BEFORE_ALL, Flown
+from gateway.sinks.scene.site import approach_reach_m
 from gateway.sinks.scene.trail import Trail
 
 Floats = NDArray[np.float64]
@@ -54,6 +54,7 @@ class TrackScene:
     def __init__(self, site: Site) -> None:
         self._units = style.units_of(site)
         self._frame = RunwayFrame(site.runway)
+        self._longest_m = max(approach_reach_m(site) / 40.0, 40.0)
         self._drawn: dict[int, _Drawn] = {}
 
     def entries(self, flights: Sequence[Flown]) -> list[Entry]:
@@ -92,8 +93,8 @@ class TrackScene:
             Always(
                 path,
                 (
-                    rr.Points3D.from_fields(colors=style.FUSED, radii=style.points(4.0)),
-                    rr.GeoPoints.from_fields(colors=style.FUSED, radii=style.points(6.0)),
+                    rr.Points3D.from_fields(colors=style.FUSED, radii=style.points(2.5)),
+                    rr.GeoPoints.from_fields(colors=style.FUSED, radii=style.points(5.0)),
                     rr.SeriesLines(names=names, colors=[style.HORIZONTAL, style.VERTICAL]),
                 ),
             ),
@@ -134,7 +135,7 @@ class TrackScene:
         path = entity("fuse", flown.track)
         roll, pitch, yaw = flown.attitude_rad.T
         quaternion = quaternion_from_attitude(roll, pitch, yaw, self._frame.runway.landing_compass_rad)
-        length = np.clip(np.linalg.norm(flown.runway_m, axis=-1) / 40.0, 40.0, 1200.0)
+        length = np.clip(0.1 * np.linalg.norm(flown.runway_m, axis=-1), 40.0, self._longest_m)
         half, axes = ellipsoid(self._frame, flown.covariance, ELLIPSOID_SIGMAS)
         placed = rr.Transform3D.columns(
             translation=flown.runway_m, quaternion=quaternion, scale=np.repeat(length[:, None], 3, axis=1)

@@ -16,7 +16,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from gateway.frames import RunwayFrame
-from gateway.fuse import Fused
+from gateway.fuse import Ended, Fused
 from gateway.settings import DEMO_SITE
 from gateway.sinks.recording import optimise
 from gateway.sinks.rerun import RerunSink
@@ -140,6 +140,17 @@ def test_a_track_that_ends_is_said_and_leaves_the_scene(tmp_path, pictures):
     for path in ("/fuse/1", "/predict/1", "/approach/1", r"/raw/gps/mavlink\:1", "/raw/radar/1/3"):
         assert entities[path][-1].get("Clear:is_recursive") == [True], path
     assert entities["/fuse/state/1"][-1]["StateChange:state"] == ["ended"]
+
+
+def test_a_track_that_ended_in_the_past_leaves_the_scene_after_its_last_row(tmp_path, pictures):
+    """An association found late ends a track at an instant that is older than rows already drawn."""
+    made = pictures(20.0)
+    ended = replace(made[-1].fuse, ended=(Ended(START + 16_000_000_000, 1, "joined track 2"),))
+    record(tmp_path / "a.rrd", [*made[:-1], replace(made[-1], fuse=ended)])
+    entities = read(tmp_path / "a.rrd")
+    for path in ("/fuse/1", "/predict/1"):
+        assert entities[path][-1].get("Clear:is_recursive") == [True]
+        assert entities[path][-1]["utc"] >= max(times(entities, path))
 
 
 def test_an_estimator_without_modes_draws_none(tmp_path, pictures):
