@@ -71,9 +71,9 @@ class RadarTracks:
         if known and plot.at > known[-1].at and _is_another_target(known, plot):
             key, known = (*number, present + 1), ()
             episodes = {**episodes, number: present + 1}
-        elif known and plot.at < known[0].at and present and (*number, present - 1) in self.plots:
-            key = (*number, present - 1)
-            known = self.plots[key]
+        elif known and plot.at < known[0].at and (earlier := self.plots.get((*number, present - 1))):
+            if plot.at <= earlier[-1].at or not _is_another_target(earlier, plot):
+                key, known = (*number, present - 1), earlier
         elif number not in episodes:
             episodes = {**episodes, number: present}
         place = bisect_right(known, (plot.at, plot.serial), key=lambda other: (other.at, other.serial))
