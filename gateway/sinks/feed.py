@@ -22,7 +22,7 @@ import rerun.blueprint as rrb
 from gateway.sinks.scene.entry import Always, Entry, send
 
 BATCHES_WAITING = 64  # for a viewer that stands still: about 25 s of them, then they are dropped
-FLUSH_S = 10.0  # without a limit a flush of a file that could not grow any more waits for ever
+FLUSH_S = 5.0  # without a limit a flush of a file that could not grow any more waits for ever
 STOP_S = 5.0  # a viewer that stands still does not hold up the end of the session for longer
 
 
@@ -81,7 +81,11 @@ class FileFeed:
             if not self._failed:  # what failed once was said once
                 self._flush()
         finally:
-            self._stream.disconnect()
+            # After a write that failed Rerun may wait here for ever, and again when the stream is collected: a thread of
+            # its own keeps the stream, and the session's end does not wait for it.
+            ending = threading.Thread(target=self._stream.disconnect, name="recording's end", daemon=True)
+            ending.start()
+            ending.join(0.5 if self._failed else None)
 
 
 class ServedFeed:
