@@ -19,10 +19,12 @@ Floats = NDArray[np.float64]
 
 
 def turn(matrix: Floats, vectors: ArrayLike) -> Floats:
-    """One matrix (3, 3) applied to vectors (..., 3); the same bits for one and for many."""
+    """One matrix (3, 3) applied to vectors (..., 3); the same bits for one and for many.
+
+    A product for each vector, not one product over all of them, whose bits would change with their number.
+    """
     given = np.asarray(vectors, dtype=np.float64)
-    x, y, z = given[..., 0], given[..., 1], given[..., 2]
-    return np.stack([row[0] * x + row[1] * y + row[2] * z for row in matrix], axis=-1)
+    return np.asarray((matrix @ given[..., None])[..., 0])
 
 
 def level_axes(compass_rad: float) -> Floats:
@@ -112,15 +114,21 @@ def polar_from_xyz(radar_m: ArrayLike) -> Floats:
     Source: 003 2.2 eq 5, with atan2.
     """
     given = np.asarray(radar_m, dtype=np.float64)
-    x, y, z = (given[..., axis].copy() for axis in range(3))
+    x, y, z = given[..., 0], given[..., 1], given[..., 2]
     level = x * x + y * y
-    return np.stack([np.sqrt(level + z * z), np.arctan2(y, x), np.arctan2(z, np.sqrt(level))], axis=-1)
+    polar = np.empty(given.shape)
+    polar[..., 0], polar[..., 1], polar[..., 2] = (
+        np.sqrt(level + z * z),
+        np.arctan2(y, x),
+        np.arctan2(z, np.sqrt(level)),
+    )
+    return polar
 
 
 def xyz_from_polar(polar: ArrayLike) -> Floats:
     """Radar-frame positions (..., 3) of range m, azimuth rad, elevation rad (..., 3)."""
     given = np.asarray(polar, dtype=np.float64)
-    distance, azimuth, elevation = (given[..., axis].copy() for axis in range(3))
+    distance, azimuth, elevation = given[..., 0], given[..., 1], given[..., 2]
     level = distance * np.cos(elevation)
     return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), distance * np.sin(elevation)], axis=-1)
 
@@ -132,14 +140,14 @@ def polar_jacobian(radar_m: ArrayLike) -> Floats:
     """
     given = np.asarray(radar_m, dtype=np.float64)
     x, y, z = given[..., 0], given[..., 1], given[..., 2]
-    level = np.sqrt(np.maximum(x * x + y * y, 1.0))
-    distance = np.sqrt(level * level + z * z)
-    jacobian = np.zeros((*given.shape[:-1], 3, 3))
-    jacobian[..., 0, 0], jacobian[..., 0, 1], jacobian[..., 0, 2] = x / distance, y / distance, z / distance
-    jacobian[..., 1, 0], jacobian[..., 1, 1] = -y / (level * level), x / (level * level)
-    square = distance * distance
-    jacobian[..., 2, 0], jacobian[..., 2, 1] = -x * z / (square * level), -y * z / (square * level)
-    jacobian[..., 2, 2] = level / square
+    level_square = np.maximum(x * x + y * y, 1.0)
+    square = level_square + z * z
+    level = np.sqrt(level_square)
+    jacobian = np.zeros((*given.shape, 3))
+    jacobian[..., 0, :] = given / np.sqrt(square)[..., None]
+    jacobian[..., 1, 0], jacobian[..., 1, 1] = -y / level_square, x / level_square
+    steep = -z / (square * level)
+    jacobian[..., 2, 0], jacobian[..., 2, 1], jacobian[..., 2, 2] = x * steep, y * steep, level / square
     return jacobian
 
 

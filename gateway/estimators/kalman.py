@@ -58,20 +58,26 @@ class Motion:
     error_sigma_m: float  # an axis; 0 = the position source is taken to have no constant error
     error_time_constant_s: float = 36000.0
 
+    def noise(self, elapsed_s: Floats, keep: Floats) -> Floats:
+        """Process noise (n, 9, 9) over times (n, 1, 1) >= 0, of which the source errors keep a share (n, 1, 1)."""
+        density = np.array(self.acceleration_density * 3)[:, None]  # by rows: each block's rows are east, north, up
+        t = elapsed_s
+        moving = (t * density) * (t * (t * _OF_POSITION + _OF_BOTH) + _OF_VELOCITY)
+        if not self.error_sigma_m:
+            return moving
+        return moving + (self.error_sigma_m**2 * (1.0 - keep * keep)) * _ERROR_STAYS
+
 
 def predict(state: Estimate, elapsed_s: Floats, motion: Motion) -> Estimate:
-    """The states `elapsed_s` (n,) later. White-noise acceleration, so that two short steps equal one long one.
+    """The states `elapsed_s` (n,), not negative, later. White-noise acceleration, so that two short steps equal one long one.
 
     Source: 003 2.4 eq 17, 18.
     """
     t = elapsed_s[:, None, None]
-    keep = np.exp(np.abs(t) / -motion.error_time_constant_s)
+    keep = np.exp(t / -motion.error_time_constant_s)
     carry = _UNCHANGED + t * _VELOCITY_MOVES + keep * _ERROR_STAYS
-    density = np.tile(motion.acceleration_density, 3)[:, None]  # scales rows: each block's rows are east, north, up
-    noise = (np.abs(t) * density) * (t * t * _OF_POSITION + t * _OF_BOTH + _OF_VELOCITY)
-    noise += (motion.error_sigma_m**2 * (1.0 - keep * keep)) * _ERROR_STAYS
     mean = (carry @ state.mean[:, :, None])[:, :, 0]
-    return Estimate(mean, carry @ state.covariance @ carry.transpose(0, 2, 1) + noise)
+    return Estimate(mean, carry @ state.covariance @ carry.transpose(0, 2, 1) + motion.noise(t, keep))
 
 
 def _blocks(*places: tuple[slice, slice], scale: float = 1.0) -> Floats:
@@ -102,38 +108,42 @@ def update(
     Joseph's form: the covariance stays symmetric and positive whatever the rounding.
     Source: 003 2.4 eq 19, 20.
     """
-    measured = ~np.isnan(innovation)
-    y = np.where(measured, innovation, 0.0)
-    h = np.where(measured[:, :, None], sensitivity, 0.0)
-    r = np.where(measured, variance, 1.0)
-    cross = state.covariance @ h.transpose(0, 2, 1)
-    axis = np.arange(y.shape[1])
-    predicted = h @ cross
-    s = predicted.copy()
-    s[:, axis, axis] += r
+    missing = np.isnan(innovation)
+    measured = ~missing
+    h, y, r = sensitivity, innovation, variance
+    if missing.any():
+        y, r = np.where(missing, 0.0, y), np.where(missing, 1.0, r)
+        h = np.where(missing[:, :, None], 0.0, h)
+    across = h.transpose(0, 2, 1)
+    cross = state.covariance @ across
+    m = y.shape[1]
+    s = h @ cross
+    s[:, _ALONG[:m], _ALONG[:m]] += r
     inverse = np.linalg.inv(s)
-    normalised = np.maximum((y[:, None, :] @ inverse @ y[:, :, None])[:, 0, 0], 0.0)
+    column = y[:, :, None]
+    normalised = np.maximum((column.transpose(0, 2, 1) @ inverse @ column)[:, 0, 0], 0.0)
     outlying = np.zeros(len(y), dtype=np.bool_)
     if robust is not None:
         limit = robust * robust * np.maximum(measured.sum(axis=1), 1)
         outlying = normalised > limit
         if outlying.any():
-            factor = np.where(outlying, normalised / limit, 1.0)[:, None]
             # S must grow by the factor, not R: a confident prediction would otherwise hold out for ever.
-            r = np.where(measured, r + (factor - 1.0) * s[:, axis, axis], 1.0)
-            s = predicted
-            s[:, axis, axis] += r
+            growth = (np.where(outlying, normalised / limit, 1.0)[:, None] - 1.0) * s[:, _ALONG[:m], _ALONG[:m]]
+            growth = np.where(missing, 0.0, growth)
+            r = r + growth
+            s[:, _ALONG[:m], _ALONG[:m]] += growth
             inverse = np.linalg.inv(s)
     gain = cross @ inverse
-    mean = state.mean + (gain @ y[:, :, None])[:, :, 0]
-    reduced = -(gain @ h)
-    diagonal = np.arange(SIZE)
-    reduced[:, diagonal, diagonal] += 1.0
-    covariance = reduced @ state.covariance @ reduced.transpose(0, 2, 1) + (gain * r[:, None, :]) @ gain.transpose(
-        0, 2, 1
-    )
+    mean = state.mean + (gain @ column)[:, :, 0]
+    reduced = _IDENTITY - gain @ h
+    spread = (gain * r[:, None, :]) @ gain.transpose(0, 2, 1)
+    covariance = reduced @ state.covariance @ reduced.transpose(0, 2, 1) + spread
     covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))
     return Estimate(mean, covariance), Innovation(y, s, measured, normalised, outlying)
+
+
+_IDENTITY = np.eye(SIZE)
+_ALONG = np.arange(SIZE)
 
 
 def start(

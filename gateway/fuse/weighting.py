@@ -27,6 +27,13 @@ WINDOW = 8  # innovations remembered by `innovation`
 LEAST_RESIDUAL = 1e-3  # sigmas; the literal weights are singular at a residual of 0
 
 
+AXES = np.arange(3)
+
+# What a GPS report measures of the state: position (and, where the source may be wrong, its error), and velocity.
+_FIX = np.eye(6, SIZE)
+_FIX_WITH_ERROR = _FIX + np.eye(6, SIZE, 6)
+
+
 @dataclass(frozen=True, slots=True)
 class Model:
     """How tracks move and how sources are weighed: the settings of a run in the filter's terms."""
@@ -90,20 +97,19 @@ def update_with_fixes(
 ) -> tuple[Estimate, Innovation, Floats]:
     """States after GPS reports; arrays as in `start_from_fixes`; memory (n, w, 3) of past position innovations."""
     n = len(position)
-    sensitivity = np.zeros((n, 6, SIZE))
-    axis = np.arange(3)
-    sensitivity[:, axis, axis] = sensitivity[:, axis + 3, axis + 3] = 1.0
+    has_error = bool(model.motion.error_sigma_m)
+    sensitivity = np.broadcast_to(_FIX_WITH_ERROR if has_error else _FIX, (n, 6, SIZE))
     expected = state.mean[:, POSITION]
-    if model.motion.error_sigma_m:
-        sensitivity[:, axis, axis + 6] = 1.0
+    if has_error:
         expected = expected + state.mean[:, ERROR]
     innovation = np.concatenate([position - expected, velocity - state.mean[:, VELOCITY]], axis=1)
-    variance = np.concatenate([sigma * sigma, np.repeat((velocity_sigma * velocity_sigma)[:, None], 3, axis=1)], axis=1)
+    speed_variance = np.broadcast_to((velocity_sigma * velocity_sigma)[:, None], (n, 3))
+    variance = np.concatenate([sigma * sigma, speed_variance], axis=1)
     if model.memory:
         known = np.concatenate([memory, innovation[:, None, :3]], axis=1)
         square = np.where(np.isnan(known), 0.0, known * known)
         mean_square = square.sum(axis=1) / np.maximum((~np.isnan(known)).sum(axis=1), 1)
-        variance[:, :3] = np.maximum(variance[:, :3], mean_square - state.covariance[:, axis, axis])
+        variance[:, :3] = np.maximum(variance[:, :3], mean_square - state.covariance[:, AXES, AXES])
         memory = known[:, 1:]
     after, told = update(state, innovation, sensitivity, variance, ROBUST_SIGMA)
     return after, told, memory
