@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from datetime import UTC, datetime
@@ -21,6 +22,7 @@ from gateway.settings import Options
 SESSION_FILE = "session.json"
 INPUTS = "inputs"
 FORMAT = 1
+_LEAST_FREE_BYTES = 32 << 20  # below, a session would end before it was worth anything
 
 
 class FolderError(ValueError):
@@ -75,7 +77,7 @@ def session_name(started_at: int, name: str) -> str:
 def make_folder(parent: Path, name: str) -> Path:
     """A new folder for one session inside `parent`, with room for its inputs.
 
-    Raises FolderError when `parent` is a session itself, is no folder or cannot be written.
+    Raises FolderError when `parent` is a session itself, is no folder, cannot be written or has no room.
     """
     if (parent / SESSION_FILE).exists():
         raise FolderError(
@@ -83,6 +85,8 @@ def make_folder(parent: Path, name: str) -> Path:
         )
     try:
         parent.mkdir(parents=True, exist_ok=True)
+        if shutil.disk_usage(parent).free < _LEAST_FREE_BYTES:
+            raise FolderError(f"The disk of {parent} is full; make room, or choose another folder for --archive.")
         for attempt in range(1, 1000):
             folder = parent / (name if attempt == 1 else f"{name}-{attempt}")
             try:

@@ -167,7 +167,8 @@ class Run:
         self._link_counters = counters
 
     def _counters(self) -> dict[str, int]:
-        return {**self._link_counters, **self._decoder.counters()}
+        gateway = self._tally.gateway_counters() if self._tally else {}
+        return {**self._link_counters, **self._decoder.counters(), **gateway}
 
     def _failure(self, error: OSError) -> RunFailure:
         where = self.folder or error.filename or "the archive"

@@ -75,6 +75,10 @@ class Tally:
         self.sources = picture.health.sources
         self.accuracy.add(picture)
 
+    def gateway_counters(self) -> dict[str, int]:
+        """What the pipeline itself counted."""
+        return {reason: number for one in self.sources if one.kind == "pipeline" for reason, number in one.counters}
+
     def named_observations(self) -> dict[str, int]:
         """Counts by what people call them."""
         return {KINDS.get(kind, kind): number for kind, number in sorted(self.observations.items()) if number}
