@@ -59,11 +59,13 @@ def _convert(stream: Path, target: Path, schema: pa.Schema) -> None:
     part = target.with_name(target.name + ".part")
     with pq.ParquetWriter(part, schema, compression="zstd") as writer:
         waiting: list[pa.RecordBatch] = []
+        rows = 0
         for batch in whole_batches(stream):
             waiting.append(batch)
-            if sum(len(one) for one in waiting) >= ROW_GROUP:
+            rows += len(batch)
+            if rows >= ROW_GROUP:
                 writer.write_table(pa.Table.from_batches(waiting, schema))
-                waiting = []
+                waiting, rows = [], 0
         if waiting:
             writer.write_table(pa.Table.from_batches(waiting, schema))
     with open(part, "rb") as written:
