@@ -83,6 +83,11 @@ class Recorder:
         """Change what session.json will say at the next flush."""
         self.record = replace(self.record, **changes)
 
+    def flush_inputs(self) -> None:
+        """Hand the inputs to the operating system: before what came of them, so that a killed session can be replayed."""
+        for recorded in self._inputs.values():
+            recorded.flush()
+
     def flush(self, watermark: int, counters: Mapping[str, int]) -> None:
         """Hand everything to the operating system; session.json then says how far it goes."""
         sources = tuple(self._inputs[number].flush() for number in sorted(self._inputs))

@@ -140,6 +140,8 @@ class Run:
         self._state, picture = step(self._state, heard, health)
         self._tally.add(picture)
         try:
+            if self._recorder is not None:
+                self._recorder.flush_inputs()
             self.outputs.write(picture)
         except OSError as error:
             raise self._failure(error) from error

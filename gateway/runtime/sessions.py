@@ -8,6 +8,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
 from gateway.runtime.folder import SESSION_FILE, FolderError, Record, read_record, write_record
 from gateway.runtime.hold import is_held
 from gateway.runtime.inputs import SessionInput
@@ -15,6 +18,7 @@ from gateway.runtime.outputs import RRD_FILE
 from gateway.sinks.parquet import finish, unfinished
 
 _OPTIMIZE_TIMEOUT_S = 120.0
+_UNTOLD_NS = 2_000_000_000  # rows are not further ahead of session.json; a stream at another speed has another clock
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,12 +78,25 @@ def mend(folder: Path) -> str:
 
 
 def _watermark(folder: Path, record: Record) -> int:
-    """How far a killed session goes: what it said last, or its last arrival."""
-    said = record.watermark if record.watermark is not None else record.started_at
+    """How far a killed session goes, by the receiver's clock: what it said last, its last arrival, its last rows.
+
+    Rows without an observation (predictions, coasting) tell that the watermark had come to their instant.
+    """
+    until = record.watermark if record.watermark is not None else record.started_at
     for source in record.sources:
         for arrival in SessionInput(folder / source.file, source.source).arrivals():
-            said = max(said, arrival.received_at)
-    return said
+            until = max(until, arrival.received_at)
+    offset_ns = (record.epoch_offset_s or 0) * 1_000_000_000
+    if not (folder / "tracks.parquet").exists():
+        return until  # it was killed before its place was known
+    made = pq.read_table(folder / "predictions.parquet", columns=["made"])["made"]
+    tracks = pq.read_table(folder / "tracks.parquet", columns=["time", "received"])
+    coasted = tracks.filter(pc.is_null(tracks["received"]))["time"]
+    for times in (made, coasted):
+        if len(times):
+            last = int(pc.max(times).value) - offset_ns
+            until = last if until < last < until + _UNTOLD_NS else until
+    return until
 
 
 def _repair_rrd(path: Path) -> None:

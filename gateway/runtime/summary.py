@@ -82,4 +82,3 @@ class Tally:
     def named_observations(self) -> dict[str, int]:
         """Counts by what people call them."""
         return {KINDS.get(kind, kind): number for kind, number in sorted(self.observations.items()) if number}
-

@@ -67,5 +67,7 @@ def test_the_comparison_sees_a_single_other_number(replayed: Path, tmp_path: Pat
     heights = table["height_m"].to_pylist()
     heights[len(heights) // 2] += 1e-9
     index = table.schema.get_field_index("height_m")
-    pq.write_table(table.set_column(index, table.schema.field(index), [heights]), tmp_path / "changed" / "tracks.parquet")
+    pq.write_table(
+        table.set_column(index, table.schema.field(index), [heights]), tmp_path / "changed" / "tracks.parquet"
+    )
     assert not same(replayed / "tracks.parquet", tmp_path / "changed" / "tracks.parquet")
