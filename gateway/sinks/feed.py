@@ -7,10 +7,9 @@ that stands still stops the file beside it; apart, neither knows of the other.
 from __future__ import annotations
 
 import errno
-import os
 import queue
-import shutil
 import socket
+import struct
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +21,8 @@ import rerun.blueprint as rrb
 from gateway.sinks.scene.entry import Always, Entry, send
 
 BATCHES_WAITING = 64  # for a viewer that stands still: about 25 s of them, then they are dropped
-FLUSH_S = 5.0  # without a limit a flush of a file that could not grow any more waits for ever
+_STREAM_HEADER = 12
+_MESSAGE_HEADER = struct.Struct("<QQ")
 STOP_S = 5.0  # a viewer that stands still does not hold up the end of the session for longer
 
 
@@ -44,48 +44,73 @@ class Identity:
 class FileFeed:
     """An .rrd file, written in the caller's thread: what `send` returned from is in the file.
 
-    After kill -9 the file opens up to the last `send`; only the index at its end is missing. Raises OSError
-    when the file cannot be opened or does not take the data. Rerun itself only writes a line to stderr then
-    and goes on without the file, and says so nowhere but in `flush`: so every `send` ends with one.
+    Rerun encodes, we write. Its own file sink, on a full disk, writes a line to stderr and goes on without the file, and
+    then often never returns from a flush, from the end of the stream or from the end of the program. Here a full disk
+    is an OSError, and the file is cut back to its last whole message. The file has no index at its end, like one of a
+    program that was killed: it opens all the same, and `gateway.sinks.recording.optimise` writes the index.
     """
 
     def __init__(self, path: Path, identity: Identity, blueprint: rrb.Blueprint) -> None:
-        self._path = path
-        path.open("wb").close()  # raises here, in plain words, if it cannot be written
+        self.path = path
+        self._file = open(path, "wb", buffering=0)  # noqa: SIM115  (lives as long as the session)
+        self._length = 0
+        self._failed = False
         self._stream = identity.stream()
-        self._stream.set_sinks(rr.FileSink(path), default_blueprint=blueprint)
+        self._encoded = rr.binary_stream(self._stream)
         self._stream.send_recording_name(identity.name)
-        self._failed = self._closed = False
+        self._stream.send_blueprint(blueprint, make_active=False, make_default=True)
+        self._write()
 
     def send(self, entries: Sequence[Entry]) -> None:
         """Write entries; raises OSError when they did not reach the file."""
         send(self._stream, entries)
-        self._flush()
+        self._write()
 
-    def _flush(self) -> None:
+    def _write(self) -> None:
+        message = self._encoded.read() or b""
+        left = memoryview(message_part(message, with_header=self._length == 0))
+        whole = self._length
         try:
-            self._stream.flush(timeout_sec=FLUSH_S)
-        except RuntimeError as error:
+            while left:
+                written = self._file.write(left)
+                self._length += written
+                left = left[written:]
+        except OSError as error:
             self._failed = True
-            full = shutil.disk_usage(self._path.parent).free < 1 << 20
-            code = errno.ENOSPC if full else errno.EIO
-            reason = f"the recording could not be written: {os.strerror(code)}"
-            raise OSError(code, reason, str(self._path)) from error
+            self._file.truncate(whole)
+            self._length = whole
+            reason = f"the recording could not be written: {error.strerror}"
+            raise OSError(error.errno, reason, str(self.path)) from error
 
-    def close(self) -> None:
-        """Write the index and let go of the file; raises OSError if the last data did not reach it."""
-        if self._closed:
-            return
-        self._closed = True
+    def close(self) -> bool:
+        """Let go of the file; whether it was open and is complete. Raises OSError if the last data did not reach it."""
+        if self._file.closed:
+            return False
         try:
             if not self._failed:  # what failed once was said once
-                self._flush()
+                self._write()
         finally:
-            # After a write that failed Rerun may wait here for ever, and again when the stream is collected: a thread of
-            # its own keeps the stream, and the session's end does not wait for it.
-            ending = threading.Thread(target=self._stream.disconnect, name="recording's end", daemon=True)
-            ending.start()
-            ending.join(0.5 if self._failed else None)
+            self._file.close()
+            self._stream.disconnect()
+        return not self._failed
+
+
+def message_part(encoded: bytes, *, with_header: bool) -> bytes:
+    """The messages of a whole .rrd stream, without its end, so that the messages of the next stream can follow.
+
+    A stream is a header of 12 bytes, messages (kind and length as little-endian 64-bit numbers, then the content), and
+    as its end a message of kind 0 with the index and 32 bytes that point to it. Raises RuntimeError for anything else.
+    """
+    if not encoded:
+        return b""
+    end, kind = _STREAM_HEADER, -1
+    while kind != 0 and end + _MESSAGE_HEADER.size <= len(encoded):
+        start = end
+        kind, length = _MESSAGE_HEADER.unpack_from(encoded, start)
+        end = start + _MESSAGE_HEADER.size + length
+    if encoded[:4] != b"RRF2" or kind != 0 or end > len(encoded):
+        raise RuntimeError("this release of rerun-sdk encodes recordings in a way that Talkdown does not know")
+    return encoded[0 if with_header else _STREAM_HEADER : start]
 
 
 class ServedFeed:

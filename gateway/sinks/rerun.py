@@ -9,6 +9,7 @@ from gateway.picture import Picture
 from gateway.settings import Site
 from gateway.sinks.blueprint import blueprint
 from gateway.sinks.feed import FileFeed, Identity, ServedFeed
+from gateway.sinks.recording import optimise
 from gateway.sinks.scene.entry import Entry
 from gateway.sinks.scene.flown import Flights
 from gateway.sinks.scene.paths import ApproachScene, PredictScene
@@ -89,13 +90,13 @@ class RerunSink:
             self._draw()
 
     def close(self) -> None:
-        """Draw what waits, end the file and the server; calling it again does nothing."""
+        """Draw what waits, end the file, make it small, end the server; calling it again does nothing."""
         try:
             self._draw()
         finally:
             try:
-                if self._file:
-                    self._file.close()
+                if self._file and self._file.close():
+                    optimise(self._file.path)
             finally:
                 if self._served:
                     self._served.close()

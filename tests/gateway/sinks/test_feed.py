@@ -5,10 +5,12 @@ from __future__ import annotations
 import resource
 import socket
 import threading
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from rerun.chunk import RrdReader
 
 from gateway.settings import DEMO_SITE
 from gateway.sinks import feed
@@ -99,3 +101,22 @@ def test_closing_twice_is_closing_once(tmp_path, pictures):
     sink.write(pictures(0.2)[0])
     sink.close()
     sink.close()
+
+
+def test_what_is_not_the_known_encoding_is_refused_in_plain_words():
+    """A release of Rerun that encodes otherwise must not leave files that nobody can open."""
+    for encoded in (b"RRF3" + bytes(60), b"RRF2" + bytes(8) + b"\x02" + bytes(7) + b"\xff" * 8, b"RRF2"):
+        with pytest.raises(RuntimeError, match="does not know"):
+            feed.message_part(encoded, with_header=True)
+
+
+def test_a_recording_on_a_full_disk_ends_with_a_whole_message(tmp_path, pictures, small_disk):
+    path = tmp_path / "session.rrd"
+    sink = RerunSink(DEMO_SITE, path=path)
+    with pytest.raises(OSError, match="recording"):
+        write_all(sink, pictures(60.0))
+    sink.close()
+    assert 300_000 < path.stat().st_size <= 400_000
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that the index is missing
+        assert sum(chunk.num_rows for chunk in RrdReader(path).stream()) > 100

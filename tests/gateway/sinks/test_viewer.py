@@ -26,7 +26,6 @@ from rerun.experimental import ViewerClient
 
 from gateway.settings import DEMO_SITE
 from gateway.sinks.blueprint import blueprint
-from gateway.sinks.recording import optimise
 from gateway.sinks.rerun import RerunSink
 
 SOFTWARE_VULKAN = Path("/usr/share/vulkan/icd.d/lvp_icd.x86_64.json")
@@ -94,7 +93,6 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, int, int]:
     for picture in made:
         sink.write(picture)
     sink.close()
-    assert optimise(path)
     return path, made[0].now, made[-1].now
 
 
