@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
+import json as text
+import math
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import UsageError
+
+if TYPE_CHECKING:
+    from sim.studies import Study
 
 _HELP = """
 Run a paper's experiment and show its table; its figures go into an .rrd for the viewer.
@@ -26,7 +33,7 @@ def register(app: typer.Typer) -> None:
 
 
 def studies() -> list[str]:
-    """The names of the studies that there are."""
+    """The names of the studies that there are; modules with an underscore in their name are parts of one."""
     found = importlib.util.find_spec("sim.studies")
     folders = list(found.submodule_search_locations or []) if found else []
     return sorted(
@@ -48,5 +55,53 @@ def study(
     """Run a paper's experiment."""
     if name not in studies():
         raise UsageError(f"There is no study {name!r}; there are: {', '.join(studies()) or 'none'}.")
+    from rich.console import Console
+    from rich.progress import Progress
+
     module = importlib.import_module(f"sim.studies.{name}")
-    module.run(runs, seed, rrd=rrd or Path(f"{name}.rrd"), quiet=quiet, json=json)
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=quiet or not console.is_terminal) as progress:
+        task = progress.add_task(name, total=1.0)
+        found: Study = module.run(
+            runs,
+            seed,
+            rrd=rrd or Path(f"{name}.rrd"),
+            progress=lambda what, share: progress.update(task, description=what, completed=share),
+        )
+    if json:
+        print(text.dumps(_plain(asdict(found))))
+    elif not quiet:
+        _show(found)
+
+
+def _show(found: Study) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False)
+    for each in found.tables:
+        table = Table(box=None, padding=(0, 2, 0, 0), title=each.title, title_justify="left")
+        for place, heading in enumerate(each.columns):
+            table.add_column(heading, justify="right" if place else "left")
+        for row in each.rows:
+            table.add_row(*(_cell(cell) for cell in row))
+        console.print(table)
+        for note in each.notes:
+            console.print(note, markup=False)
+    if found.recording:
+        console.print(f"figures: rerun {found.recording}", soft_wrap=True)
+
+
+def _cell(value: str | float) -> str:
+    if isinstance(value, str):
+        return value
+    return "-" if math.isnan(value) else f"{value:.2f}"
+
+
+def _plain(value: Any) -> Any:
+    """The same with null for NaN, which JSON does not know."""
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    return None if isinstance(value, float) and math.isnan(value) else value

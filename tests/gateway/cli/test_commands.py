@@ -69,7 +69,7 @@ def test_another_distributions_package_adapters_is_recognised(monkeypatch: pytes
     stranger = ModuleType("adapters")
     stranger.__file__ = "/somewhere/adapters/__init__.py"
     monkeypatch.setitem(sys.modules, "adapters", stranger)
-    with pytest.raises(Failure, match="another distribution's.*virtual environment of its own"):
+    with pytest.raises(Failure, match=r"another distribution's.*virtual environment of its own"):
         check_packages()
 
 
