@@ -203,7 +203,7 @@ class Work:
         for fix in fixes:
             self.association = associate.await_plots(self.association, fix)
         for plot, _ in tracked:
-            self._move(associate.check_again(self.association, plot, self.tracks, self._setting()))
+            self._move(associate.check_again(self.association, plot, self.tracks, self.setting))
         self._check_due()
 
     def _next_check(self) -> int:
@@ -213,7 +213,7 @@ class Work:
     def _check_due(self) -> None:
         """The checks whose wait is over."""
         while (fix := self.association.due) is not None and fix.at + self.wait <= (self.now or 0):
-            after = associate.check_due(self.association, self.tracks, self._setting())
+            after = associate.check_due(self.association, self.tracks, self.setting)
             self.checks += [check for check in after.checks if check.fix is fix]
             self._move(after)
 
@@ -275,12 +275,10 @@ class Work:
     def _scene(self) -> Scene:
         return Scene(self.tracks, self.association.ledger.spans, self.options)
 
-    def _setting(self) -> Setting:
-        return Setting(self.site, self.options, self.frame, self.radar_frames)
-
     def _see_radars(self) -> None:
         self.radar_frames = {number: RadarFrame.of(radar, self.frame) for number, radar in self.radars.items()}
         self.model = Model.of(self.options, self.site.position, self.radar_frames)
+        self.setting = Setting(self.site, self.options, self.frame, self.radar_frames)
 
     # counting, saying, and the result -----------------------------------------------------------------------------
 

@@ -81,43 +81,30 @@ def run(jobs: Sequence[Job], model: Model) -> list[list[Event]]:
 def _advance(
     bases: Sequence[Event | None], measures: Sequence[Measure], neighbours: Sequence[Neighbour], model: Model
 ) -> list[Event]:
-    """One measurement for each of some tracks."""
-    results: list[Event | None] = [None] * len(measures)
-    going = [row for row, base in enumerate(bases) if base is not None]
-    mean, covariance, memory = _stacked([base for base in bases if base is not None], model)
-    elapsed_s = np.array([(measures[row].at - bases[row].at) / SECOND for row in going])  # type: ignore[union-attr]
-    if going:
-        literal = model.weighting == "literal"
-        state = predict(Estimate(mean, covariance), elapsed_s, model.motion)
-        groups: dict[tuple[str, int], list[int]] = {}
-        paired = {row: neighbours[row](fix) for row in going if isinstance(fix := measures[row], Fix) and literal}
-        for place, row in enumerate(going):
-            groups.setdefault(_group(measures[row], paired.get(row)), []).append(place)
-        for (kind, radar), places in groups.items():
-            part = Estimate(state.mean[places], state.covariance[places])
-            chosen = [measures[going[place]] for place in places]
-            near = [paired.get(going[place]) for place in places]
-            after, outlying, kept = _update(kind, radar, part, chosen, near, memory[places], model)
-            for i, place in enumerate(places):
-                row = going[place]
-                results[row] = _event(measures[row], after, i, kept[i], bases[row], bool(outlying[i]))
-    for row, base in enumerate(bases):
+    """One measurement for each of some tracks: those with one formula and one radar are worked in together."""
+    literal = model.weighting == "literal"
+    events: dict[int, Event] = {}
+    groups: dict[tuple[str, int], list[tuple[int, Event, Measure, Near | None]]] = {}
+    for row, (base, measure) in enumerate(zip(bases, measures, strict=True)):
         if base is None:
-            first = _start(measures[row], model)
-            results[row] = _event(measures[row], first, 0, np.full((model.memory, 3), math.nan), None, False)
-    return [event for event in results if event is not None]
-
-
-def _stacked(bases: Sequence[Event], model: Model) -> tuple[Floats, Floats, Floats]:
-    n = len(bases)
-    mean = np.array([base.mean for base in bases]).reshape(n, 9)
-    covariance = np.array([base.covariance for base in bases]).reshape(n, 9, 9)
-    memory = np.array([base.memory for base in bases]).reshape(n, model.memory, 3)
-    return mean, covariance, memory
+            events[row] = _event(measure, _start(measure, model), 0, np.full((model.memory, 3), math.nan), None, False)
+            continue
+        near = neighbours[row](measure) if literal and isinstance(measure, Fix) else None
+        groups.setdefault(_group(measure, near), []).append((row, base, measure, near))
+    for (kind, radar), members in groups.items():
+        rows, before, chosen, seen = zip(*members, strict=True)
+        elapsed_s = np.array([(measure.at - base.at) / SECOND for base, measure in zip(before, chosen, strict=True)])
+        state = Estimate(np.array([base.mean for base in before]), np.array([base.covariance for base in before]))
+        memory = np.array([base.memory for base in before])
+        state = predict(state, elapsed_s, model.motion)
+        after, outlying, memory = _update(kind, radar, state, chosen, seen, memory, model)
+        for i, row in enumerate(rows):
+            events[row] = _event(chosen[i], after, i, memory[i], before[i], bool(outlying[i]))
+    return [events[row] for row in range(len(measures))]
 
 
 def _group(measure: Measure, near: Near | None) -> tuple[str, int]:
-    """Which measurements can be worked in together: those with one formula and one radar."""
+    """Which measurements can be worked in together."""
     if isinstance(measure, Plot):
         return "plot", measure.radar
     return ("literal", near[0]) if near is not None else ("fix", 0)
