@@ -55,8 +55,7 @@ class Intake:
 
     def take(self, heard: Sequence[tuple[int, Chunk]]) -> tuple[list[Source], list[Arrival]]:
         """Sources that are new, and the arrivals of one turn of all links (link number, chunk), in order of stamps."""
-        timed = [(self._stamper.heard_at(chunk.kernel_utc_ns), link, chunk) for link, chunk in heard]
-        timed.sort(key=lambda item: item[0])  # stable: what one link says keeps its order
+        timed = self._in_order(heard)
         sources, self._unannounced = self._unannounced, []
         arrivals: list[Arrival] = []
         for heard_at, link, chunk in timed:
@@ -75,6 +74,16 @@ class Intake:
             number = peer.source.number
             arrivals += [Arrival(self._stamper.stamp(heard_at), number, frame) for frame in frames]
         return sources, arrivals
+
+    def _in_order(self, heard: Sequence[tuple[int, Chunk]]) -> list[tuple[int, int, Chunk]]:
+        """(heard at, link, chunk) over all links by time; what one link says keeps its order whatever its stamps say."""
+        latest: dict[int, int] = {}
+        timed: list[tuple[int, int, Chunk]] = []
+        instants = self._stamper.heard([chunk.kernel_utc_ns for _, chunk in heard])
+        for instant, (link, chunk) in zip(instants, heard, strict=True):
+            latest[link] = max(instant, latest.get(link, 0))
+            timed.append((latest[link], link, chunk))
+        return sorted(timed, key=lambda item: item[0])  # stable
 
     def _cut(self, link: int, chunk: Chunk) -> tuple[_Peer, list[bytes]]:
         """The peer of a chunk, and the whole frames in it."""

@@ -7,7 +7,7 @@ and a stamp that no other arrival has makes the order of a replay the order it w
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 STAMP_STEP_NS = 4_000
 _BELIEVED_AGE_NS = 1_000_000_000  # a kernel time older than this is a clock that was set, not a datagram that waited
@@ -33,13 +33,16 @@ class Stamper:
         """The present time, ns since 1970 UTC, by the session's own clock."""
         return self._utc_of_monotonic_zero + self._monotonic_ns()
 
-    def heard_at(self, kernel_utc_ns: int | None) -> int:
-        """When a datagram was heard: what the kernel says, brought to the session's clock, else now."""
-        now = self.now()
-        if kernel_utc_ns is None:
-            return now
-        age = self._utc_ns() - kernel_utc_ns
-        return now - age if 0 <= age < _BELIEVED_AGE_NS else now
+    def heard(self, kernel_utc_ns: Sequence[int | None]) -> list[int]:
+        """When each was heard: what the kernel says, brought to the session's clock, else now.
+
+        Both clocks are read once for all: read for each, their jitter would turn datagrams around.
+        """
+        now, utc = self.now(), self._utc_ns()
+        return [
+            now if kernel is None or not 0 <= utc - kernel < _BELIEVED_AGE_NS else now - (utc - kernel)
+            for kernel in kernel_utc_ns
+        ]
 
     def stamp(self, heard_at: int) -> int:
         """A stamp for what was heard then: at or just before it, later than every stamp and watermark given before."""
