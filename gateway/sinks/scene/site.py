@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import rerun as rr
@@ -23,6 +24,18 @@ def approach_reach_m(site: Site) -> float:
     """
     ranges = [radar.maximum_range_m for radar in site.radars]
     return min(max(ranges, default=10.0 * site.runway.length_m), 50_000.0)
+
+
+def dense(strip: Floats, longest_m: float = 1000.0) -> Floats:
+    """The same line (n, 3) in pieces of at most `longest_m`.
+
+    The viewer sets a line's width on the screen at its corners: one of 50 km would be a wall beside the camera.
+    """
+    pieces = [strip[:1]]
+    for start, end in pairwise(strip):
+        count = max(1, int(np.ceil(np.linalg.norm(end - start) / longest_m)))
+        pieces.append(start + (end - start) * (np.arange(1, count + 1) / count)[:, None])
+    return np.concatenate(pieces)
 
 
 class SiteScene:
@@ -52,6 +65,7 @@ class SiteScene:
     def lines(self, path: str, strips: list[Floats], colour: style.Colour, width: float) -> Always:
         """Lines (runway frame) in the scene and on the map."""
         radius = style.points(width)
+        strips = [dense(strip) for strip in strips]
         return Always(
             path,
             (

@@ -201,11 +201,11 @@ def empty(fused: Fused) -> Fused:
 
 def test_the_glide_path_of_the_scene_meets_the_runway_at_the_aiming_point(drawn):
     (row,) = [row for row in drawn["/site/glide_path"] if "LineStrips3D:strips" in row]
-    top, foot = row["LineStrips3D:strips"][0]
+    top, *_, foot = row["LineStrips3D:strips"][0]
     aim = DEMO_SITE.runway.aiming_point_x_m
     assert foot == pytest.approx([aim, 0.0, 0.0])
     assert np.arctan2(top[2], aim - top[0]) == pytest.approx(DEMO_SITE.runway.glide_path_rad)
-    latitude, longitude = row["GeoLineStrings:line_strings"][0][1]
+    latitude, longitude = row["GeoLineStrings:line_strings"][0][-1]
     expected = RunwayFrame(DEMO_SITE.runway).geodetic_from_runway(np.array([[aim, 0.0, 0.0]]))
     assert np.radians([latitude, longitude]) == pytest.approx([expected[0][0], expected[1][0]], abs=1e-12)
 
