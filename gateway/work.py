@@ -63,7 +63,7 @@ class Work:
             if at == self.instant:
                 self._whole_second(at)
                 idle = not self.lanes.lanes and self.association.due is None
-                self.instant = (max(now // SECOND * SECOND, at) if idle else at) + SECOND
+                self.instant = (max((now - 1) // SECOND * SECOND, at) if idle else at) + SECOND
             due = self._next_check()
         self.now = max(now, self.now or now)
         self.events += [Event(now, level, text) for level, text in arrival.notes]
@@ -96,7 +96,8 @@ class Work:
             text = f"the session's time went back by {back_s:.0f} s: every track starts again, under its number"
             self.events.append(Event(now, "warning", text))
         self.lanes, self.tracks, self.association = fuse.emptied(self.lanes), RadarTracks(), Association()
-        self.now, self.instant = now, now // SECOND * SECOND + SECOND
+        # An arrival stamped at a whole second comes before what happens at that second.
+        self.now, self.instant = now, (now - 1) // SECOND * SECOND + SECOND
 
     # align --------------------------------------------------------------------------------------------------------
 
