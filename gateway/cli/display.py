@@ -127,8 +127,13 @@ def _rows(summary: Summary) -> list[tuple[str, str]]:
     ]
     if summary.epoch_offset_s:
         rows.append(("epoch offset", f"{summary.epoch_offset_s} s: the sources' date is not ours"))
-    rows += [("counted", f"{number} {reason}") for reason, number in summary.counters.items()]
+    rows += [("counted", f"{number} {reason}") for reason, number in summary.counters.items() if _is_news(reason)]
     return rows
+
+
+def _is_news(reason: str) -> bool:
+    """Whether a counter says more than how much came, which stands beside its source already."""
+    return not reason.endswith((" frames", " datagrams"))
 
 
 def _source(source: dict[str, Any]) -> str:
