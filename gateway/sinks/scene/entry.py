@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import rerun as rr
 from numpy.typing import ArrayLike, NDArray
 
@@ -52,6 +53,25 @@ def rows(path: str, time: ArrayLike, step: ArrayLike, *columns: Iterable[Any]) -
 def once(path: str, time: int, step: int, *columns: Iterable[Any]) -> Rows:
     """One row of one entity."""
     return rows(path, [time], [step], *columns)
+
+
+def strips_3d(strips: Sequence[Floats]) -> Any:
+    """Lines (k, 3) in metres as component columns, one strip a row until they are partitioned otherwise."""
+    return rr.LineStrips3D.columns(strips=_lists(strips, 3, np.float32, rr.components.LineStrip3DBatch))
+
+
+def strips_on_map(strips: Sequence[Floats]) -> Any:
+    """Lines (k, 2) in degrees of latitude and longitude, likewise."""
+    return rr.GeoLineStrings.columns(line_strings=_lists(strips, 2, np.float64, rr.components.GeoLineStringBatch))
+
+
+def _lists(strips: Sequence[Floats], width: int, kind: Any, batch: Any) -> Any:
+    """Lines as one Arrow array: Rerun's own conversion takes 30 us a line, this one 1."""
+    offsets = np.concatenate([[0], np.cumsum([len(strip) for strip in strips])]).astype(np.int32)
+    numbers = pa.array(np.concatenate(strips).astype(kind).reshape(-1))
+    wanted = batch._ARROW_DATATYPE
+    points = pa.FixedSizeListArray.from_arrays(numbers, type=wanted.value_type)
+    return pa.ListArray.from_arrays(pa.array(offsets), points, type=wanted)
 
 
 def in_order(time: Ints) -> NDArray[np.intp]:

@@ -15,7 +15,7 @@ from gateway.predict import Predicted
 from gateway.settings import Site
 from gateway.sinks.approach import deviations
 from gateway.sinks.scene import style
-from gateway.sinks.scene.entry import Always, Entry, entity, rows
+from gateway.sinks.scene.entry import Always, Entry, entity, rows, strips_3d, strips_on_map
 from gateway.sinks.scene.flown import BEFORE_ALL, Flown
 
 Floats = NDArray[np.float64]
@@ -136,8 +136,8 @@ class PredictScene:
             radius = style.points(0.8)
             line = rr.LineStrips3D.from_fields(colors=look, radii=radius)
             entries.append(Always(path, (line, rr.GeoLineStrings.from_fields(colors=look, radii=radius))))
-        scene = rr.LineStrips3D.columns(strips=strips).partition(lengths)
-        on_map = rr.GeoLineStrings.columns(line_strings=ground).partition(lengths)
+        scene = strips_3d(strips).partition(lengths)
+        on_map = strips_on_map(ground).partition(lengths)
         return [*entries, rows(path, time, step, scene, on_map)]
 
 

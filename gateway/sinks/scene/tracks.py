@@ -18,7 +18,7 @@ from gateway.frames import RunwayFrame
 from gateway.settings import Site
 from gateway.sinks.scene import style
 from gateway.sinks.scene.attitude import ellipsoid, quaternion_from_attitude
-from gateway.sinks.scene.entry import Always, Entry, entity, rows
+from gateway.sinks.scene.entry import Always, Entry, entity, rows, strips_3d
 from gateway.sinks.scene.flown import BEFORE_ALL, Flown
 from gateway.sinks.scene.site import approach_reach_m
 from gateway.sinks.scene.trail import Trail
@@ -167,7 +167,7 @@ class TrackScene:
         place = flown.runway_m[chosen]
         block = rr.Points3D.columns(positions=place, labels=texts)
         # a line down to the runway's plane: without it nobody sees how high, or over which point of the ground
-        drop = rr.LineStrips3D.columns(strips=list(np.stack([place, place * [1.0, 1.0, 0.0]], axis=1)))
+        drop = strips_3d(list(np.stack([place, place * [1.0, 1.0, 0.0]], axis=1)))
         return [rows(f"{entity('fuse', flown.track)}/label", flown.time[chosen], flown.step[chosen], block, drop)]
 
     def _plots(self, flown: Flown, drawn: _Drawn) -> list[Entry]:

@@ -14,7 +14,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from gateway.sinks.scene import style
-from gateway.sinks.scene.entry import Always, Entry, rows
+from gateway.sinks.scene.entry import Always, Entry, rows, strips_3d, strips_on_map
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -85,8 +85,8 @@ class Trail:
         if not grown:
             return []
         if self._kind == "line":
-            scene = rr.LineStrips3D.columns(strips=[runway for runway, _ in shapes])
-            ground = rr.GeoLineStrings.columns(line_strings=[lat_lon for _, lat_lon in shapes])
+            scene = strips_3d([runway for runway, _ in shapes])
+            ground = strips_on_map([lat_lon for _, lat_lon in shapes])
         else:
             lengths = [len(runway) for runway, _ in shapes]
             scene = rr.Points3D.columns(positions=np.concatenate([runway for runway, _ in shapes]))
