@@ -1,0 +1,45 @@
+"""Associate: which radar track is which aircraft (paper 003, 2.3).
+
+At most once a second, each aircraft's GPS report is checked against every radar track near it: gates of three sigma in
+range, azimuth and elevation about the GPS point, a counter for each pair, associated when the counter is full, lost when
+it is empty. A check waits until plots can bracket it and holds from the report's own time; late data repeat the checks
+they touch and what followed from these, so that the result is that of in-order processing.
+
+`gates` compares one report with the radar tracks near it; `ledger` counts and pairs; `checks` keeps both in order of time.
+"""
+
+from gateway.associate.checks import (
+    Associated,
+    Association,
+    Check,
+    await_plots,
+    check_again,
+    check_due,
+    forgotten,
+    missing,
+    pruned,
+    table,
+)
+from gateway.associate.gates import Comparison, Setting
+from gateway.associate.ledger import Change, Count, Ledger, Span, aircraft_of, ordinal_of
+
+__all__ = [
+    "Associated",
+    "Association",
+    "Change",
+    "Check",
+    "Comparison",
+    "Count",
+    "Ledger",
+    "Setting",
+    "Span",
+    "aircraft_of",
+    "await_plots",
+    "check_again",
+    "check_due",
+    "forgotten",
+    "missing",
+    "ordinal_of",
+    "pruned",
+    "table",
+]

@@ -1,0 +1,39 @@
+"""What is known before the first byte arrives: the site (where runway and radars stand) and the options of a run.
+
+A site file is TOML with the unit in every key's name; inside, everything is SI and radians.
+"""
+
+from gateway.settings.options import AssociationRule, Options, Weighting
+from gateway.settings.reading import SiteError, parse_site
+from gateway.settings.site import (
+    DEMO_SITE,
+    DecisionPoint,
+    PositionSource,
+    RadarSite,
+    Runway,
+    Site,
+    Units,
+    Waypoint,
+    Weather,
+    with_radar,
+)
+from gateway.settings.writing import format_site
+
+__all__ = [
+    "DEMO_SITE",
+    "AssociationRule",
+    "DecisionPoint",
+    "Options",
+    "PositionSource",
+    "RadarSite",
+    "Runway",
+    "Site",
+    "SiteError",
+    "Units",
+    "Waypoint",
+    "Weather",
+    "Weighting",
+    "format_site",
+    "parse_site",
+    "with_radar",
+]

@@ -1,0 +1,27 @@
+"""What may be chosen for a run: methods, models, and how long things last."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Weighting = Literal["bias", "covariance", "innovation", "literal"]
+AssociationRule = Literal["default", "literal"]
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What may be chosen for a run; everything in here changes numbers, so all of it is archived."""
+
+    weighting: Weighting = "bias"
+    association: AssociationRule = "default"
+    acceleration_sigma_mps2: float = 2.0  # of the constant-velocity model, east and north
+    vertical_acceleration_sigma_mps2: float = 1.0  # aircraft change their climb less than their course
+    acceleration_time_s: float = 0.4  # white over this time: sigma^2 x time is the density, whatever the step
+    associate_at: int = 3  # hits in a row before a radar track and an aircraft are one
+    association_wait_s: float = 1.0  # how long after a GPS report's validity plots may still bracket it
+    history_s: float = 10.0  # later than this is too late
+    coast_after_s: float = 2.0  # without an update for this long a track is coasting
+    end_after_s: float = 30.0  # and for this long it ends
+    prediction_period_s: float = 1.0
+    horizons_s: tuple[float, ...] = (10.0, 30.0, 60.0)

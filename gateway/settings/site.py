@@ -1,0 +1,134 @@
+"""The site: where the runway and the radars stand, and what the sources are worth; SI and radians."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+Units = Literal["si", "aviation"]
+
+
+@dataclass(frozen=True, slots=True)
+class Runway:
+    """The runway: its centre is the origin of the ENU and runway frames.
+
+    `threshold_x_m` (negative) and `glide_path_origin_x_m` follow from the length, the glide path and the crossing height.
+    """
+
+    latitude_rad: float
+    longitude_rad: float
+    height_m: float
+    landing_compass_rad: float
+    geoid_separation_m: float | None = None
+    length_m: float = 3000.0
+    width_m: float = 45.0
+    glide_path_rad: float = math.radians(3.0)
+    threshold_crossing_height_m: float = 15.0
+
+    @property
+    def threshold_x_m(self) -> float:
+        """Runway-frame x of the landing threshold."""
+        return -0.5 * self.length_m
+
+    @property
+    def aiming_point_x_m(self) -> float:
+        """Runway-frame x where the glide path meets the runway."""
+        return self.threshold_x_m + self.threshold_crossing_height_m / math.tan(self.glide_path_rad)
+
+
+@dataclass(frozen=True, slots=True)
+class PositionSource:
+    """What a position source is worth when its stream does not say: noise an axis, and allowed constant error."""
+
+    sigma_m: float = 15.0
+    systematic_m: float = 60.0
+    velocity_sigma_mps: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class RadarSite:
+    """One radar's place in the runway frame and the noise of its measurements."""
+
+    number: int
+    along_m: float
+    left_m: float
+    antenna_height_m: float
+    compass_boresight_rad: float
+    range_sigma_m: float = 15.0
+    azimuth_sigma_rad: float = math.radians(0.0573)
+    elevation_sigma_rad: float = math.radians(0.0573)
+    maximum_range_m: float = 60000.0
+    key_file: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DecisionPoint:
+    """A named point on the approach, before the threshold."""
+
+    name: str
+    distance_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Waypoint:
+    """A published point, a candidate of intent."""
+
+    name: str
+    latitude_rad: float
+    longitude_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class Weather:
+    """An area to avoid: a circle about a point, or a polygon; between two times where they are given (ISO 8601, UTC)."""
+
+    name: str
+    latitude_rad: float | None = None
+    longitude_rad: float | None = None
+    radius_m: float | None = None
+    polygon_rad: tuple[tuple[float, float], ...] = ()
+    valid_from: str | None = None
+    valid_until: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """Everything that is known of the place before the first byte arrives."""
+
+    name: str
+    runway: Runway
+    position: PositionSource = PositionSource()
+    radars: tuple[RadarSite, ...] = ()
+    decision_points: tuple[DecisionPoint, ...] = ()
+    waypoints: tuple[Waypoint, ...] = ()
+    weather: tuple[Weather, ...] = ()
+    units: Units = "si"
+
+    def radar(self, number: int) -> RadarSite | None:
+        """The radar of this number, or None."""
+        return next((radar for radar in self.radars if radar.number == number), None)
+
+
+def with_radar(site: Site, radar: RadarSite) -> Site:
+    """The same site with this radar added, or in place of the one of its number."""
+    others = tuple(known for known in site.radars if known.number != radar.number)
+    return replace(site, radars=(*others, radar))
+
+
+DEMO_SITE = Site(
+    name="Demo field",
+    runway=Runway(
+        latitude_rad=math.radians(31.0),
+        longitude_rad=math.radians(104.0),
+        height_m=500.0,
+        landing_compass_rad=math.radians(90.0),
+        geoid_separation_m=-35.0,
+    ),
+    radars=(
+        RadarSite(
+            number=1, along_m=300.0, left_m=150.0, antenna_height_m=3.0, compass_boresight_rad=math.radians(270.0)
+        ),
+    ),
+    decision_points=(DecisionPoint("DA", 1500.0),),
+)

@@ -1,0 +1,89 @@
+"""A site written as the text of a site file."""
+
+from __future__ import annotations
+
+import json
+import math
+
+from gateway.settings.site import PositionSource, RadarSite, Runway, Site, Weather
+
+
+def format_site(site: Site) -> str:
+    """The TOML text of a site; parsing it again gives the same site to the digits written.
+
+    Angles are written to 1e-9 degrees (0.1 mm on the ground), lengths to 0.1 mm.
+    """
+    lines = [f"name = {_quoted(site.name)}", "", "[display]", f'units = "{site.units}"                # or "aviation"']
+    lines += ["", "[runway]", *_runway(site.runway), "", *_position(site.position)]
+    for radar in site.radars:
+        lines += ["", "[[radar]]", *_radar(radar)]
+    for point in site.decision_points:
+        lines += ["", "[[decision_point]]", f"name = {_quoted(point.name)}", f"distance_m = {point.distance_m:g}"]
+    for waypoint in site.waypoints:
+        lines += ["", "[[waypoint]]", f"name = {_quoted(waypoint.name)}"]
+        lines += _place(waypoint.latitude_rad, waypoint.longitude_rad)
+    for area in site.weather:
+        lines += ["", "[[weather]]", *_weather(area)]
+    return "\n".join(lines) + "\n"
+
+
+def _runway(runway: Runway) -> list[str]:
+    latitude, longitude = _place(runway.latitude_rad, runway.longitude_rad)
+    lines = [f"{latitude}          # centre", longitude]
+    lines.append(f"height_m = {runway.height_m:.4f}              # above the ellipsoid")
+    if runway.geoid_separation_m is not None:
+        lines.append(f"geoid_separation_m = {runway.geoid_separation_m:.4f}   # height_m = altitude_msl_m + this")
+    return [
+        *lines,
+        f"landing_direction_deg = {math.degrees(runway.landing_compass_rad):.6f} # true, main landing direction",
+        f"length_m = {runway.length_m:.1f}",
+        f"width_m = {runway.width_m:.1f}",
+        f"glide_path_deg = {math.degrees(runway.glide_path_rad):.4f}",
+        f"threshold_crossing_height_m = {runway.threshold_crossing_height_m:.2f}",
+    ]
+
+
+def _position(position: PositionSource) -> list[str]:
+    return [
+        "[position]                   # what a position source is worth when its stream does not say",
+        f"sigma_m = {position.sigma_m:g}",
+        f"systematic_m = {position.systematic_m:g}          # allowed constant error",
+        f"velocity_sigma_mps = {position.velocity_sigma_mps:g}",
+    ]
+
+
+def _radar(radar: RadarSite) -> list[str]:
+    lines = [
+        f"number = {radar.number}",
+        f"along_m = {radar.along_m:.4f}              # antenna in the runway frame: x",
+        f"left_m = {radar.left_m:.4f}               # y",
+        f"antenna_height_m = {radar.antenna_height_m:.4f}     # z, above the runway plane",
+        f"boresight_deg = {math.degrees(radar.compass_boresight_rad) % 360.0:.6f}",
+        f"range_sigma_m = {radar.range_sigma_m:g}",
+        f"azimuth_sigma_deg = {math.degrees(radar.azimuth_sigma_rad):.6g}",
+        f"elevation_sigma_deg = {math.degrees(radar.elevation_sigma_rad):.6g}",
+        f"maximum_range_m = {radar.maximum_range_m:g}",
+    ]
+    return [*lines, f"key_file = {_quoted(radar.key_file)}"] if radar.key_file else lines
+
+
+def _weather(area: Weather) -> list[str]:
+    lines = [f"name = {_quoted(area.name)}"]
+    if area.latitude_rad is not None and area.longitude_rad is not None:
+        lines += [*_place(area.latitude_rad, area.longitude_rad), f"radius_m = {area.radius_m:g}"]
+    else:
+        corners = (
+            f"[{math.degrees(latitude):.9f}, {math.degrees(longitude):.9f}]" for latitude, longitude in area.polygon_rad
+        )
+        lines.append(f"polygon_deg = [{', '.join(corners)}]")
+    times = (("from", area.valid_from), ("until", area.valid_until))
+    return [*lines, *(f'{key} = "{value}"' for key, value in times if value)]
+
+
+def _place(latitude_rad: float, longitude_rad: float) -> tuple[str, str]:
+    return f"latitude_deg = {math.degrees(latitude_rad):.9f}", f"longitude_deg = {math.degrees(longitude_rad):.9f}"
+
+
+def _quoted(text: str) -> str:
+    """A TOML basic string, control characters included."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
