@@ -1,0 +1,1 @@
+"""What Talkdown costs: `make bench`, or `python -m bench --help`."""

@@ -1,0 +1,106 @@
+"""`make bench`: measures and prints a table; `--json FILE` keeps every sample."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from bench.lively import core_share, lateness
+from bench.measure import Figure, load, machine
+from bench.replays import help_text, ten_hours, ten_minutes
+from bench.throughput import throughput
+
+FLEETS = (1, 30)
+THROUGHPUT_S = 120.0
+
+
+class Part(StrEnum):
+    """What can be measured alone."""
+
+    replay = "replay"
+    help = "help"
+    live = "live"
+    late = "late"
+    pipeline = "pipeline"
+    hours = "hours"
+
+
+def bench(
+    runs: Annotated[int, typer.Option("--runs", metavar="N", min=1, help="How often what is short is measured.")] = 5,
+    seconds: Annotated[float, typer.Option("--seconds", metavar="S", min=5.0, help="How long live runs last.")] = 30.0,
+    long: Annotated[bool, typer.Option("--long", help="Also replay ten hours, which takes minutes.")] = False,
+    only: Annotated[list[Part] | None, typer.Option("--only", help="Only this; repeatable.")] = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write every sample there.", show_default=False)
+    ] = None,
+) -> None:
+    """Measure what Talkdown costs on this machine. Best on a quiet one: figures are medians, ranges stand beside them."""
+    wanted = set(only or Part) - (set() if long or only else {Part.hours})
+    console = Console()
+    console.print(f"{machine()}; {load()}")
+    figures = _measure(wanted, runs, seconds, Console(stderr=True))
+    console.print(_table(figures))
+    console.print(load())
+    if json_file is not None:
+        document = {"machine": machine(), "figures": [figure.document() for figure in figures]}
+        json_file.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    if any(figure.holds is False for figure in figures):
+        raise typer.Exit(1)
+
+
+def _measure(wanted: set[Part], runs: int, seconds: float, console: Console) -> list[Figure]:
+    def say(text: str) -> None:
+        console.print(text, style="dim", highlight=False)
+
+    figures: list[Figure] = []
+    with tempfile.TemporaryDirectory(prefix="talkdown-bench-") as name:
+        folder = Path(name)
+        if Part.help in wanted:
+            figures += help_text(runs)
+        if Part.replay in wanted:
+            figures += ten_minutes(folder, runs, say)
+        if Part.live in wanted:
+            say("one aircraft, live")
+            figures += core_share(folder, seconds)
+        if Part.late in wanted:
+            say("late reports, live")
+            figures += lateness(seconds)
+        for aircraft in FLEETS if Part.pipeline in wanted else ():
+            say(f"the pipeline with {aircraft} aircraft")
+            figures += throughput(aircraft, THROUGHPUT_S, min(runs, 3))
+        if Part.hours in wanted:
+            figures += ten_hours(folder, say)
+    return figures
+
+
+def _table(figures: list[Figure]) -> Table:
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for column in ("", "median", "lowest", "highest", "target", ""):
+        table.add_column(column, justify="left" if not column else "right", no_wrap=True)
+    for figure in figures:
+        target = "" if figure.at_most is None else f"≤ {figure.at_most:g} {figure.unit}"
+        verdict = {None: "", True: "[green]holds[/]", False: "[red]missed[/]"}[figure.holds]
+        spread = (min(figure.samples), max(figure.samples)) if len(figure.samples) > 1 else ()
+        table.add_row(
+            figure.name,
+            f"{_digits(figure.median)} {figure.unit}",
+            *([_digits(one) for one in spread] or ["", ""]),
+            target,
+            verdict,
+        )
+    return table
+
+
+def _digits(value: float) -> str:
+    return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}"
+
+
+if __name__ == "__main__":
+    typer.run(bench)
