@@ -20,7 +20,7 @@ import rerun.blueprint as rrb
 
 from gateway.sinks.scene.entry import Always, Entry, send
 
-BATCHES_WAITING = 64  # for a viewer that stands still: about 25 s of them, then they are dropped
+BATCHES_WAITING = 512  # for a viewer that stands still: some 200 s and 20 MB of them, then they are dropped
 _STREAM_HEADER = 12
 _MESSAGE_HEADER = struct.Struct("<QQ")
 STOP_S = 5.0  # a viewer that stands still does not hold up the end of the session for longer

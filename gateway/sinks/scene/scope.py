@@ -139,11 +139,7 @@ class ScopeScene:
             Always(f"{ROOT}/lines/runway", (_lines(hard, style.RUNWAY, 2.0),)),
             Always(
                 f"{ROOT}/lines/marks",
-                (
-                    rr.Points2D(
-                        places, labels=texts, show_labels=True, colors=style.CENTRELINE, radii=style.points(0.1)
-                    ),
-                ),
+                (rr.Points2D(places, labels=texts, show_labels=True, colors=style.MARK, radii=style.points(0.1)),),
             ),
             Always(
                 f"{ROOT}/lines/decision",

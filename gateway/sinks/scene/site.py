@@ -125,7 +125,7 @@ class SiteScene:
         texts = [f"{distance * units.distances:.0f} {units.distance}" for distance in distances]
         return [
             self.lines("/site/centreline", strips, style.CENTRELINE, 0.8),
-            self.labels("/site/centreline/distance", places, texts, style.CENTRELINE, 1.0),
+            self.labels("/site/centreline/distance", places, texts, style.MARK, 1.0),
         ]
 
     def _glide_path(self, runway: Runway) -> list[Always]:
@@ -155,7 +155,7 @@ class SiteScene:
         place = entity("site", "radar", radar.number)
         return [
             self.lines(place, [mast], style.RADAR, 2.0),
-            self.labels(f"{place}/antenna", antenna[None], [name], style.RADAR, 3.0),
+            self.labels(f"{place}/antenna", antenna[None], [name], style.ANTENNA, 3.0),
             self.lines(f"{place}/coverage", [strip], style.COVERAGE, 0.6),
         ]
 

@@ -19,6 +19,8 @@ JOINED: Colour = (255, 230, 80)
 TEXT: Colour = (235, 235, 235)
 
 RUNWAY: Colour = (225, 225, 225)
+MARK: Colour = (200, 235, 210)  # texts stand on dark grey or, in the viewer's light theme, on middle grey
+ANTENNA: Colour = (165, 205, 255)
 CENTRELINE: Colour = (120, 160, 130)
 GLIDE_PATH: Colour = (70, 200, 120)
 COVERAGE: Colour = (45, 80, 130)
