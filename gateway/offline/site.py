@@ -4,7 +4,7 @@ Looked at in this order, over all aircraft in the order they were heard:
 1. the landing item of a mission: the aiming point, in the direction of the leg that leads to it;
 2. HOME_POSITION: the runway's centre, in the direction in which the aircraft stands or first moves;
 3. where an aircraft stood still for 5 s, with its nose in the landing direction;
-4. after a minute without any of these, the first position that was reported.
+4. after a minute without any of these, or at the end of a recording, the first position that was reported.
 No radar is invented: where none is known, none is there.
 """
 
@@ -85,10 +85,11 @@ class _Told:
         return median(given) if given else None
 
 
-def propose_site(observations: Iterable[Observation]) -> SiteProposal | None:
+def propose_site(observations: Iterable[Observation], *, complete: bool = False) -> SiteProposal | None:
     """The site that these observations tell of, or None as long as they do not.
 
     Observations in the order they were heard; what is no GpsReport, FlightPlan or VehicleStatus is passed over.
+    `complete`: nothing more will come, so that what there is must do.
     """
     told: dict[str, _Told] = {}
     for observation in observations:
@@ -101,13 +102,13 @@ def propose_site(observations: Iterable[Observation]) -> SiteProposal | None:
     reporting = [aircraft for aircraft in told.values() if aircraft.reports]
     for propose in (_from_landing, _from_home, _from_standing, _from_first_report):
         for aircraft in reporting:
-            proposal = propose(aircraft)
+            proposal = propose(aircraft, complete)
             if proposal is not None:
                 return proposal
     return None
 
 
-def _from_landing(told: _Told) -> SiteProposal | None:
+def _from_landing(told: _Told, complete: bool) -> SiteProposal | None:
     found = told.landing()
     if found is None:
         return None
@@ -138,24 +139,24 @@ def _ground_altitude(told: _Told, landing: PlanPoint, home: PlanPoint | None) ->
     return None, ""
 
 
-def _from_home(told: _Told) -> SiteProposal | None:
+def _from_home(told: _Told, complete: bool) -> SiteProposal | None:
     home = told.home()
     if home is None or home.altitude_msl_m is None:
         return None
     heard_ns = told.reports[-1].valid_at - told.reports[0].valid_at
-    if heard_ns < _SETTLED_NS and told.standing() is None and not told.has_moved():
+    if not complete and heard_ns < _SETTLED_NS and told.standing() is None and not told.has_moved():
         return None  # a compass that was just switched on still turns
     direction, meaning = _direction(told)
     why = f"the home position of {told.aircraft}, in the direction {meaning}"
     return _proposal(told, (home.latitude_rad, home.longitude_rad), home.altitude_msl_m, direction, why)
 
 
-def _from_standing(told: _Told) -> SiteProposal | None:
+def _from_standing(told: _Told, complete: bool) -> SiteProposal | None:
     return _at_report(told, told.standing(), "where {} stands, in the direction {}")
 
 
-def _from_first_report(told: _Told) -> SiteProposal | None:
-    if told.reports[-1].valid_at - told.reports[0].valid_at < _PATIENCE_NS:
+def _from_first_report(told: _Told, complete: bool) -> SiteProposal | None:
+    if not complete and told.reports[-1].valid_at - told.reports[0].valid_at < _PATIENCE_NS:
         return None
     return _at_report(told, told.reports[0], "where {} was heard first, in the direction {}: there is no better hint")
 

@@ -44,11 +44,11 @@ class PlaceFinder:
             return
         self._telling.append(observation)
 
-    def place(self) -> Place | None:
-        """The place that is told by now, or None."""
+    def place(self, *, complete: bool = False) -> Place | None:
+        """The place that is told by now, or None; `complete`: nothing more will come."""
         from gateway.offline.site import propose_site
 
-        proposal = propose_site(self._telling)
+        proposal = propose_site(self._telling, complete=complete)
         if proposal is None:
             return None
         text = format_site(proposal.site)
@@ -60,4 +60,4 @@ class PlaceFinder:
         for arrival in arrivals:
             for observation in decoder.feed(arrival).observations:
                 self.gather(observation)
-        return self.place()
+        return self.place(complete=True)

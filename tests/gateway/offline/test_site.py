@@ -104,3 +104,15 @@ def test_who_never_stood_still_lands_after_a_minute_where_it_was_heard_first() -
     assert proposal is not None
     assert math.degrees(proposal.site.runway.landing_compass_rad) == pytest.approx(180.0)
     assert "no better hint" in proposal.origin
+
+
+def test_the_first_report_of_a_short_recording_must_do_when_nothing_more_will_come() -> None:
+    """Ten seconds in flight tell no place to a link that goes on, and one to a recording that ends there."""
+    flown = [
+        replace(report, latitude_rad=LATITUDE + second * 1e-5, velocity_north_mps=60.0)
+        for second, report in enumerate(_standing())
+    ]
+    assert propose_site(flown) is None
+    proposal = propose_site(flown, complete=True)
+    assert proposal is not None
+    assert proposal.site.runway.latitude_rad == LATITUDE
