@@ -148,9 +148,11 @@ class MavlinkObserver:
         self._say_fix(heard.vehicle)
         if not fresh or not clock.has_been_heard() or not clock.is_settled(heard.received_at):
             return ()
-        if fixes.last_position is not None and -_STALE < at - fixes.last_position < _STALE:
+        told = fix_time(heard.payload)
+        valid = told if 0 <= at - told <= _LATEST_FIX else at  # the fix's own time, where it is one since this boot
+        if fixes.last_position is not None and abs(valid - fixes.last_position) < _SLOWEST_POSITION:
             return ()  # the autopilot's own estimate is better, and it comes
-        report = fixes.raw_report(heard.payload, heard.vehicle.name, self._when(heard, at), heard.received_at, at)
+        report = fixes.raw_report(heard.payload, heard.vehicle.name, self._when(heard, valid), heard.received_at, at)
         return () if report is None else (report,)
 
     def _say_fix(self, vehicle: Vehicle) -> None:
@@ -285,7 +287,8 @@ class _Heard:
     counters: Counter[str]
 
 
-_STALE = 5 * SECOND
+_LATEST_FIX = 10 * SECOND  # a fix told later than this is not believed to be of that time
+_SLOWEST_POSITION = 12 * SECOND  # a vehicle that sends no position for this long sends none
 
 
 def _tells_apart(message: int, payload: bytes) -> bool:

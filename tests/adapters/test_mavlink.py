@@ -352,6 +352,19 @@ def test_a_vehicle_with_only_gps_raw_int_is_still_heard() -> None:
     assert report.altitude_msl_m == 500.0
 
 
+def test_a_position_of_gps_raw_int_is_of_the_time_of_its_fix_not_of_its_arrival() -> None:
+    """The receiver tells when the fix was taken, 1.5 s before the message is heard: the report is of that time."""
+    talker = Talker(Decoder())
+    found: list[Observation] = []
+    for number in range(100):
+        talker.second = number / 10
+        talker.attitude()
+        found += talker.fix(time_usec=(talker.boot_ms - 1500) * 1000)
+    report = found[-1]
+    assert isinstance(report, GpsReport)
+    assert report.received_at - report.valid_at == pytest.approx(1.5 * SECOND, abs=0.01 * SECOND)
+
+
 def test_a_lost_fix_is_said_and_a_reboot_is_said(plane: Talker) -> None:
     plane.position()
     plane.fix(fix_type=0)
