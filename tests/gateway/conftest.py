@@ -226,7 +226,7 @@ class World:
                 gone = "".join(np.array(list("rae"))[random.uniform(size=3) < [0.05, 0.2, 0.2]]) if missing else ""
                 t_s = plots_from_s + 0.4 * k
                 said.append(self.radar_plot(course, t_s, radar=radar, number=number, off=off, missing=gone))
-        return [one for one in said if gone_is_not_all(one)]
+        return [one for one in said if measures_something(one)]
 
     # the pipeline ---------------------------------------------------------------------------------------------------
 
@@ -259,7 +259,7 @@ class World:
         return Run(state, tuple(pictures))
 
 
-def gone_is_not_all(one: Observation) -> bool:
+def measures_something(one: Observation) -> bool:
     """Whether a plot has any component."""
     return not isinstance(one, RadarPlot) or (one.range_m, one.azimuth_rad, one.elevation_rad) != (None, None, None)
 

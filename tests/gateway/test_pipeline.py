@@ -160,6 +160,24 @@ def test_shuffled_within_5_s_is_in_order(
             assert rows[key][name] == others[key][name]
 
 
+@pytest.mark.parametrize("weighting", WEIGHTINGS)
+def test_plots_from_just_before_the_pair_that_come_after_it_are_in_order(
+    world: Any, differences: Callable[..., float], weighting: Weighting
+) -> None:
+    """Plots valid just before the report that made the pair, heard after the pair was made, leave the aircraft in order."""
+    said = _in_order(world.flight(seconds=20.0, missing=False))
+    late = [
+        replace(one, received_at=one.valid_at + 3 * world.SECOND)
+        if isinstance(one, RadarPlot) and world.at(9.0) < one.valid_at < world.at(10.13)
+        else one
+        for one in said
+    ]
+    options = Options(weighting=weighting)
+    wanted, found = (_measured(world.run(given, options=options).last(aircraft=ONE)) for given in (said, late))
+    assert wanted.keys() == found.keys()
+    assert differences(wanted, found) < 1e-9
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_reused_number_is_told_apart_in_shuffled_data_too(
     world: Any, differences: Callable[..., float], seed: int
