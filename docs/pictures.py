@@ -1,0 +1,68 @@
+"""Makes every picture of README and docs anew: the sessions behind them, then the pictures, in the real viewer.
+
+    python docs/pictures.py                # about a minute; needs what docs/make_pictures.py needs
+
+Sessions and figures go into a temporary folder; pictures into docs/pictures/.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from PIL import Image
+
+DOCS = Path(__file__).resolve().parent
+OUT = DOCS / "pictures"
+FLIGHT = DOCS.parent / "tests" / "data" / "sitl-landing-excerpt.tlog"
+PROGRAM = Path(sys.executable).with_name("talkdown")
+SCOPE = "Precision approach: elevation over azimuth, x10"
+
+
+def talkdown(*arguments: str | Path) -> str:
+    """Run one command; what it printed."""
+    command = [str(PROGRAM), *map(str, arguments)]
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+
+def draw(recording: Path, name: str, *options: str) -> None:
+    """One picture of a recording, with few enough colours to be small."""
+    target = OUT / f"{name}.png"
+    command = [sys.executable, str(DOCS / "make_pictures.py"), str(recording), str(target), *options]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    Image.open(target).quantize(192, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(
+        target, optimize=True
+    )
+    print(f"{target.name}: {target.stat().st_size // 1000} kB")
+
+
+def only_session(folder: Path) -> Path:
+    """The one session in a folder."""
+    (session,) = folder.iterdir()
+    return session
+
+
+def main() -> None:
+    """All pictures."""
+    OUT.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as name:
+        work = Path(name)
+        talkdown("simulate", "landing", "--speed", "max", "--archive", work / "simulated")
+        simulated = only_session(work / "simulated")
+        talkdown("replay", simulated, "--viewer", "none", "--archive", work / "landing")
+        landing = only_session(work / "landing") / "session.rrd"
+        draw(landing, "landing", "--at", "0.75")
+        draw(landing, "join", "--at", "0.08")
+        draw(landing, "scope", "--at", "0.8", "--view", SCOPE)
+        site = work / "field.toml"
+        site.write_text(talkdown("site", FLIGHT), encoding="utf-8")
+        talkdown("simulate", "radar", "--watch", FLIGHT, "--site", site, "--archive", work / "seen")
+        (seen,) = (work / "seen").iterdir()
+        talkdown("replay", FLIGHT, seen, "--site", site, "--viewer", "none", "--archive", work / "sitl")
+        draw(only_session(work / "sitl") / "session.rrd", "sitl", "--at", "0.985")
+
+
+if __name__ == "__main__":
+    main()
