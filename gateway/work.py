@@ -95,7 +95,9 @@ class Work:
             back_s = (self.now - now) / SECOND
             text = f"the session's time went back by {back_s:.0f} s: every track starts again, under its number"
             self.events.append(Event(now, "warning", text))
-        self.lanes, self.tracks, self.association = fuse.emptied(self.lanes), RadarTracks(), Association()
+        self.lanes, ended = fuse.emptied(self.lanes, now)
+        self.ended += ended
+        self.tracks, self.association = RadarTracks(), Association()
         # An arrival stamped at a whole second comes before what happens at that second.
         self.now, self.instant = now, (now - 1) // SECOND * SECOND + SECOND
 

@@ -35,6 +35,9 @@ def root(
     """Only there for --version, and so that every command keeps its name."""
 
 
+_INTERRUPTED = 130  # what the command line's library makes of a KeyboardInterrupt, depending on where it strikes
+
+
 def run(arguments: list[str]) -> int:
     """Run one command line; the exit code."""
     if arguments == ["--version"]:
@@ -46,16 +49,18 @@ def run(arguments: list[str]) -> int:
     except Failure as failure:
         return _tell(str(failure), failure.exit_code)
     except typer.Exit as left:
-        return left.exit_code
+        result = left.exit_code
     except _WRONG_USAGE as refusal:
         return _tell(_sentence(refusal), 2)
     except (KeyboardInterrupt, typer.Abort):
-        return _tell(
-            "Stopped at once; `talkdown sessions` on the archive's folder completes what was being written.", 1
-        )
+        result = _INTERRUPTED
     except BrokenPipeError:  # the reader of our output has seen enough
         sys.stderr.close()
         return 0
+    if result == _INTERRUPTED:
+        return _tell(
+            "Stopped at once; `talkdown sessions` on the archive's folder completes what was being written.", 1
+        )
     return result if isinstance(result, int) else 0
 
 

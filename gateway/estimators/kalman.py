@@ -62,10 +62,11 @@ class Motion:
         """Process noise (n, 9, 9) over times (n, 1, 1) >= 0, of which the source errors keep a share (n, 1, 1)."""
         density = np.array(self.acceleration_density * 3)[:, None]  # by rows: each block's rows are east, north, up
         t = elapsed_s
-        moving = (t * density) * (t * (t * _OF_POSITION + _OF_BOTH) + _OF_VELOCITY)
+        moving: Floats = (t * density) * (t * (t * _OF_POSITION + _OF_BOTH) + _OF_VELOCITY)
         if not self.error_sigma_m:
             return moving
-        return moving + (self.error_sigma_m**2 * (1.0 - keep * keep)) * _ERROR_STAYS
+        moving += (self.error_sigma_m**2 * (1.0 - keep * keep)) * _ERROR_STAYS
+        return moving
 
 
 def predict(state: Estimate, elapsed_s: Floats, motion: Motion) -> Estimate:

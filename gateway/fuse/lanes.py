@@ -34,6 +34,7 @@ class Lane:
     events: tuple[Event, ...] = ()
     whole: bool = True  # nothing of its past was forgotten yet
     ended_at: int | None = None
+    emptied_at: int = 0  # when its past was forgotten
 
     @property
     def last(self) -> Event:
@@ -175,7 +176,7 @@ def end_silent(lanes: Lanes, at: int, options: Options) -> tuple[Lanes, list[End
         if lane.ended_at is not None:
             if lane.ended_at < at - history:
                 gone.append(lane.track)
-        elif not lane.events or at - lane.last.at > limit:
+        elif at - (lane.last.at if lane.events else lane.emptied_at) > limit:
             gone.append(lane.track)
             ended.append(Ended(at, lane.track, f"no data for {options.end_after_s:.0f} s"))
     return (lanes.without(gone), ended) if gone else (lanes, ended)
@@ -195,10 +196,19 @@ def joined(lanes: Lanes, spans: Sequence[Span]) -> tuple[Lanes, list[Ended]]:
     return lanes, ended
 
 
-def emptied(lanes: Lanes) -> Lanes:
-    """The aircraft's lanes without their past; radar tracks' lanes are gone."""
-    kept = {track: replace(lane, events=(), whole=True) for track, lane in lanes.lanes.items() if lane.key is None}
-    return replace(lanes, lanes=kept, by_key={})
+def emptied(lanes: Lanes, at: int) -> tuple[Lanes, list[Ended]]:
+    """The aircraft's lanes without their past, under their numbers; radar tracks' lanes end."""
+    kept = {
+        track: replace(lane, events=(), whole=True, emptied_at=at)
+        for track, lane in lanes.lanes.items()
+        if lane.key is None and lane.ended_at is None
+    }
+    ended = [
+        Ended(at, track, "the session's time was set back")
+        for track, lane in lanes.lanes.items()
+        if lane.key is not None and lane.ended_at is None
+    ]
+    return replace(lanes, lanes=kept, by_key={}), ended
 
 
 def reroute(lanes: Lanes, old: tuple[Span, ...], scene: Scene) -> tuple[Lanes, list[Job]]:

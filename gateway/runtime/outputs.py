@@ -16,6 +16,7 @@ from gateway.sinks.rerun import RerunSink
 
 RRD_FILE = "session.rrd"
 _WATCHED = (0.4, 256)  # seconds and rows that are drawn at once, for people who look on
+_TABLES_WATCHED_S = 1.0  # of rows that a kill may cost
 _UNWATCHED = (10.0, 4096)  # where a recording is replayed as fast as it goes: fewer, larger batches cost less
 
 
@@ -30,7 +31,9 @@ class Outputs:
         self._sinks: list[Sink] = []
         self._rerun: RerunSink | None = None
         if folder is not None:
-            self._sinks.append(ArrowSink(folder, geoid_separation_m=site.runway.geoid_separation_m or 0.0))
+            separation_m = site.runway.geoid_separation_m or 0.0
+            period_s = _TABLES_WATCHED_S if watched else _UNWATCHED[0]
+            self._sinks.append(ArrowSink(folder, geoid_separation_m=separation_m, period_s=period_s))
         if folder is not None or serve is not None:
             self._rerun = _rerun(site, folder, serve, watched)
             self._sinks.append(self._rerun)

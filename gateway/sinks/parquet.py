@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 
 from gateway.sinks.arrow import SCHEMAS
 
-ROW_GROUP = 65536  # rows gathered before Parquet is handed a row group: bounds memory, keeps compression good
+ROW_GROUP = 16384  # rows gathered before Parquet is handed a row group: bounds memory, keeps compression good
 
 
 def finish(folder: Path) -> tuple[Path, ...]:
@@ -42,7 +42,7 @@ def whole_batches(stream: Path) -> Iterator[pa.RecordBatch]:
 
     A stream that was cut inside its schema, or is empty, has none. Raises OSError when it cannot be opened.
     """
-    with pa.memory_map(str(stream)) as source:
+    with pa.OSFile(str(stream)) as source:  # not a memory map: its pages would count as ours until the end
         try:
             reader = pa.ipc.open_stream(source)
         except (pa.ArrowInvalid, OSError):  # nothing whole was written yet
@@ -57,7 +57,9 @@ def whole_batches(stream: Path) -> Iterator[pa.RecordBatch]:
 
 def _convert(stream: Path, target: Path, schema: pa.Schema) -> None:
     part = target.with_name(target.name + ".part")
-    with pq.ParquetWriter(part, schema, compression="zstd") as writer:
+    # numbers hardly repeat: a dictionary of them takes most of the time and of the memory, and makes the file larger
+    texts = [field.name for field in schema if pa.types.is_string(field.type)]
+    with pq.ParquetWriter(part, schema, compression="zstd", use_dictionary=texts) as writer:
         waiting: list[pa.RecordBatch] = []
         rows = 0
         for batch in whole_batches(stream):

@@ -270,6 +270,15 @@ def test_a_session_whose_time_goes_back_starts_again_and_says_so(world: Any) -> 
         assert found[at].tobytes() == position.tobytes()
 
 
+def test_an_aircraft_keeps_its_number_when_the_session_time_goes_back(world: Any) -> None:
+    """Also one that reports each 5 s, so that whole seconds pass before it is heard again."""
+    first = world.flight(seconds=22.0, gps_period_s=5.0)
+    back = 1000 * world.SECOND
+    again = [replace(one, valid_at=one.valid_at - back, received_at=one.received_at - back) for one in first]
+    ran = world.run([*world.heard(first), *world.heard(again)], until_s=-975.0)
+    assert len({row["track"] for row in ran.rows(aircraft=ONE)}) == 1
+
+
 # what must not be fused -----------------------------------------------------------------------------------------------
 
 
