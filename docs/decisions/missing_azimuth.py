@@ -15,7 +15,7 @@ from sim.cases import case_003
 from sim.studies.fusion import COUNTED_FROM_S
 
 PARTS = (
-    ("turn onto the centreline", 47_000.0, 25_000.0),
+    ("turn", 47_000.0, 25_000.0),
     ("straight", 25_000.0, 10_000.0),
     ("last 10 km", 10_000.0, 1_200.0),
 )
@@ -32,6 +32,4 @@ if __name__ == "__main__":
             means = across.mean(axis=0)
             cells = (float(means.mean()), float(np.abs(means).max()), float(np.sqrt((across**2).mean())))
             total = float(np.sqrt((some**2).sum(axis=-1).mean()))
-            print(
-                f"{part + ', ' + name:<32}"[:32] + f"{cells[0]:>11.1f}{cells[1]:>10.1f}{cells[2]:>13.1f}{total:>10.1f}"
-            )
+            print(f"{part + ', ' + name:<29}" + f"{cells[0]:>11.1f}{cells[1]:>10.1f}{cells[2]:>13.1f}{total:>10.1f}")
