@@ -13,6 +13,6 @@ def main() -> None:
     code = run(sys.argv[1:])
     sys.stdout.flush()
     sys.stderr.flush()
-    if code == 1:
-        os._exit(code)  # after a disk that filled, or a second Ctrl-C, no library's own clean-up may hold us up
-    sys.exit(code)
+    # Everything of ours is closed by now. Taking a thousand modules apart costs 0.15 s, and after a disk that filled, or a
+    # second Ctrl-C, a library's own clean-up could hold us up for ever.
+    os._exit(code)

@@ -17,7 +17,7 @@ from gateway.sinks.rerun import RerunSink
 RRD_FILE = "session.rrd"
 _WATCHED = (0.4, 256)  # seconds and rows that are drawn at once, for people who look on
 _TABLES_WATCHED_S = 1.0  # of rows that a kill may cost
-_UNWATCHED = (10.0, 4096)  # where a recording is replayed as fast as it goes: fewer, larger batches cost less
+_UNWATCHED = (30.0, 4096)  # where a recording is replayed as fast as it goes: fewer, larger batches cost less
 
 
 class Outputs:

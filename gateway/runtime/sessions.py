@@ -8,9 +8,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import pyarrow.compute as pc
-import pyarrow.parquet as pq
-
 from gateway.runtime.folder import SESSION_FILE, FolderError, Record, read_record, write_record
 from gateway.runtime.hold import is_held
 from gateway.runtime.inputs import SessionInput
@@ -82,6 +79,9 @@ def _watermark(folder: Path, record: Record) -> int:
 
     Rows without an observation (predictions, coasting) tell that the watermark had come to their instant.
     """
+    import pyarrow.compute as pc  # 0.1 s that every start would wait for, and only what was killed needs
+    import pyarrow.parquet as pq
+
     until = record.watermark if record.watermark is not None else record.started_at
     for source in record.sources:
         for arrival in SessionInput(folder / source.file, source.source).arrivals():
