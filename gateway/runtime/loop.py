@@ -15,6 +15,7 @@ from gateway.runtime.setup import RunFailure, Setup
 from gateway.runtime.summary import Summary
 
 TICK_S = 0.02
+_IDLE_NS = 100_000_000  # when nothing came, the watermark alone is worked in this often: an empty step costs 1 ms
 _REPLAY_STEP_NS = 1_000_000_000  # of stamps, at full speed: large steps are cheap steps
 _PACED_STEP_NS = 40_000_000
 _NO_PLACE_AFTER_S = 90.0  # after a minute even the first position would do
@@ -53,7 +54,7 @@ def run_live(
             receiver.start()
             ended = _live(receiver, run, seconds, watch, asked_to_stop, no_place_after_s)
             receiver.close()
-            _tick(receiver, run)
+            _tick(receiver, run, watch, idle_ns=0)
             return run.finish(ended)
     finally:
         receiver.close()
@@ -71,7 +72,7 @@ def _live(
     began = time.monotonic()
     while True:
         tick_began = time.monotonic()
-        watch(run, _tick(receiver, run))
+        _tick(receiver, run, watch)
         if run.place is None and run.heard_for_s > no_place_after_s:
             raise RunFailure(
                 "Nothing that came in tells where the runway is (no HOME_POSITION, no mission, nobody standing still); "
@@ -84,12 +85,16 @@ def _live(
         time.sleep(max(0.0, TICK_S - (time.monotonic() - tick_began)))
 
 
-def _tick(receiver: Receiver, run: Run) -> Picture | None:
+def _tick(receiver: Receiver, run: Run, watch: Watch, idle_ns: int = _IDLE_NS) -> None:
+    """Work in what came; where nothing did, the watermark, if it has not been worked in for a while."""
     delivery = receiver.drain()
+    is_idle = not (delivery.arrivals or delivery.sources or delivery.notes)
+    if is_idle and delivery.watermark - run.watermark < idle_ns:
+        return
     for source in delivery.sources:
         run.add(source)
     run.count(receiver.counters())
-    return run.work(delivery.arrivals, delivery.watermark, delivery.notes)
+    watch(run, run.work(delivery.arrivals, delivery.watermark, delivery.notes))
 
 
 def run_replay(

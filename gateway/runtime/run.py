@@ -61,6 +61,11 @@ class Run:
         """How long ago the first arrival was, in s of the session; 0 before it."""
         return 0.0 if self._first_at is None else (self._watermark - self._first_at) / 1e9
 
+    @property
+    def watermark(self) -> int:
+        """How far the session has come, a stamp, ns since 1970 UTC."""
+        return self._watermark
+
     def _record_into(self, folder: Path) -> Recorder:
         record = Record(__version__, self.setup.command, self.setup.options, self.started_at)
         try:
