@@ -94,7 +94,10 @@ def picture(
         names = {one.name: one.view_id for one in client.get_state().views}
         if view is not None and view not in names:
             raise SystemExit(f"There is no view {view!r}; there are: {', '.join(sorted(names))}.")
-        shot = client.take_screenshot(None if view is None else names[view], max_size=int(size.split("x")[0]))
+        try:
+            shot = client.take_screenshot(None if view is None else names[view], max_size=int(size.split("x")[0]))
+        except ConnectionError as error:
+            raise SystemExit(f"The view {view!r} is behind another tab, and cannot be drawn alone.") from error
     image = Image.open(io.BytesIO(shot)).convert("RGB")
     if view is None:
         image = image.crop((0, round(MENU_SHARE * image.height), image.width, image.height))

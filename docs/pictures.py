@@ -12,8 +12,6 @@ import sys
 import tempfile
 from pathlib import Path
 
-from PIL import Image
-
 DOCS = Path(__file__).resolve().parent
 OUT = DOCS / "pictures"
 FLIGHT = DOCS.parent / "tests" / "data" / "sitl-landing-excerpt.tlog"
@@ -28,13 +26,10 @@ def talkdown(*arguments: str | Path) -> str:
 
 
 def draw(recording: Path, name: str, *options: str) -> None:
-    """One picture of a recording, with few enough colours to be small."""
+    """One picture of a recording."""
     target = OUT / f"{name}.png"
     command = [sys.executable, str(DOCS / "make_pictures.py"), str(recording), str(target), *options]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    Image.open(target).quantize(192, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(
-        target, optimize=True
-    )
     print(f"{target.name}: {target.stat().st_size // 1000} kB")
 
 
@@ -54,7 +49,6 @@ def main() -> None:
         talkdown("replay", simulated, "--viewer", "none", "--archive", work / "landing")
         landing = only_session(work / "landing") / "session.rrd"
         draw(landing, "landing", "--at", "0.75")
-        draw(landing, "join", "--at", "0.08")
         draw(landing, "scope", "--at", "0.8", "--view", SCOPE)
         site = work / "field.toml"
         site.write_text(talkdown("site", FLIGHT), encoding="utf-8")
