@@ -90,7 +90,7 @@ def picture(
         first, last = opened(client, session)
         instant = np.datetime64(int(first + at * (last - first)), "ns")
         client.set_time("utc", timestamp=instant, play_state="paused")
-        time.sleep(2.0)  # the plots settle
+        time.sleep(7.0)  # the plots settle, and the viewer's own notices go
         names = {one.name: one.view_id for one in client.get_state().views}
         if view is not None and view not in names:
             raise SystemExit(f"There is no view {view!r}; there are: {', '.join(sorted(names))}.")
