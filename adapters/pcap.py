@@ -19,6 +19,7 @@ import struct
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import BinaryIO
 
 from adapters.tlog import RecordSink
@@ -170,6 +171,7 @@ class PcapWriter:
         self._sink.write(record + ip + udp + data)
 
 
+@lru_cache(maxsize=64)
 def _address(peer: str) -> tuple[bytes, int]:
     host, _, port = peer.rpartition(":")
     number = int(port) if port.isdecimal() and int(port) < 65536 else 0
