@@ -57,7 +57,9 @@ def kind_of(path: Path) -> Kind:
         return "ulg"
     if _is_tlog(beginning):
         return "tlog"
-    raise FileError(f"{path} is {_what_else(beginning)}: a .tlog, .pcap, .pcapng, .BIN or .ulg file can be replayed.")
+    raise FileError(
+        f"{path} is {_what_else(beginning)}: a .tlog, .pcap or .pcapng file, or a session's folder, can be replayed."
+    )
 
 
 def _is_tlog(beginning: bytes) -> bool:
@@ -200,7 +202,9 @@ def open_recording(path: Path, first_number: int = 0) -> Recording:
     """
     kind = kind_of(path)
     if kind not in ("tlog", "pcap", "pcapng"):
-        raise FileError(f"{path} is a {kind} file: it is not read as a recording of arrivals.")
+        raise FileError(
+            f"{path} is a .{kind} file, which cannot be replayed yet: give the .tlog of the same flight, or a .pcap or .pcapng."
+        )
     return Recording(path, kind, first_number)
 
 

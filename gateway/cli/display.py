@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from gateway.runtime.summary import Summary
 
 _REFRESH_S = 0.2
+_WAITING_SAID_AFTER_S = 3.0  # by then most streams have told where they are
 _STYLES = {"info": "dim", "warning": "yellow", "error": "bold red"}
 
 
@@ -43,6 +44,7 @@ class Display:
         )  # fmt: skip
         self._task: TaskID | None = None
         self._due = 0.0
+        self._waiting_said = False
 
     def __enter__(self) -> Self:
         self._progress.start()
@@ -58,6 +60,12 @@ class Display:
 
     def watch(self, run: Run, picture: Picture | None) -> None:
         """Show what a step brought."""
+        if run.place is None and run.heard_for_s > _WAITING_SAID_AFTER_S and not self._waiting_said:
+            self._waiting_said = True
+            self.say(
+                "Without a site file the picture begins once an aircraft tells its home or a landing in its mission, or "
+                "stands still; after a minute its first position must do. --site FILE begins at once."
+            )
         if run.outputs is not None and (told := self._viewing.open(run.outputs.address)) is not None:
             self.say(told)
         if picture is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import json as text
 import math
 from dataclasses import asdict
@@ -32,15 +31,6 @@ def register(app: typer.Typer) -> None:
     app.command("study", help=_HELP)(study)
 
 
-def studies() -> list[str]:
-    """The names of the studies that there are; modules with an underscore in their name are parts of one."""
-    found = importlib.util.find_spec("sim.studies")
-    folders = list(found.submodule_search_locations or []) if found else []
-    return sorted(
-        path.stem for folder in folders for path in Path(folder).glob("*.py") if not path.stem.startswith("_")
-    )
-
-
 def study(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Which study, such as fusion.", show_default=False)],
     runs: Annotated[int, typer.Option("--runs", metavar="N", min=1, help="How often each case is drawn.")] = 200,
@@ -53,10 +43,13 @@ def study(
     json: take.JsonOption = False,
 ) -> None:
     """Run a paper's experiment."""
-    if name not in studies():
-        raise UsageError(f"There is no study {name!r}; there are: {', '.join(studies()) or 'none'}.")
     from rich.console import Console
     from rich.progress import Progress
+
+    from sim.studies import STUDIES
+
+    if name not in STUDIES:
+        raise UsageError(f"There is no study {name!r}; there are: {', '.join(STUDIES)}.")
 
     module = importlib.import_module(f"sim.studies.{name}")
     console = Console(stderr=True)

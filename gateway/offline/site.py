@@ -66,6 +66,8 @@ class _Told:
             if _speed_mps(report) > _STANDING_MPS or (begin and _distance_m(begin, report) > _STANDING_M):
                 begin = None
                 continue
+            if begin and report.valid_at < begin.valid_at:
+                begin = report  # its clock was set meanwhile
             begin = begin or report
             if report.valid_at - begin.valid_at >= _STANDING_NS:
                 return report
@@ -143,7 +145,7 @@ def _from_home(told: _Told, complete: bool) -> SiteProposal | None:
     home = told.home()
     if home is None or home.altitude_msl_m is None:
         return None
-    heard_ns = told.reports[-1].valid_at - told.reports[0].valid_at
+    heard_ns = told.reports[-1].received_at - told.reports[0].received_at
     if not complete and heard_ns < _SETTLED_NS and told.standing() is None and not told.has_moved():
         return None  # a compass that was just switched on still turns
     direction, meaning = _direction(told)
@@ -156,7 +158,7 @@ def _from_standing(told: _Told, complete: bool) -> SiteProposal | None:
 
 
 def _from_first_report(told: _Told, complete: bool) -> SiteProposal | None:
-    if not complete and told.reports[-1].valid_at - told.reports[0].valid_at < _PATIENCE_NS:
+    if not complete and told.reports[-1].received_at - told.reports[0].received_at < _PATIENCE_NS:
         return None
     return _at_report(told, told.reports[0], "where {} was heard first, in the direction {}: there is no better hint")
 

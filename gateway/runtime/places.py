@@ -28,7 +28,7 @@ class PlaceFinder:
             for observation in item.observations:
                 self.gather(observation)
         now = heard[-1].now if heard else 0
-        if self._asked_at is not None and now - self._asked_at < _ASK_EVERY_NS:
+        if self._asked_at is not None and 0 <= now - self._asked_at < _ASK_EVERY_NS:  # time can be set back
             return None
         self._asked_at = now
         return self.place()

@@ -246,7 +246,7 @@ def _hint(key: str, known: list[str]) -> str:
     from difflib import get_close_matches
 
     near = get_close_matches(key, known, n=1)
-    return f"; did you mean {near[0]}?" if near else f"; known are {', '.join(known)}"
+    return f"; perhaps {near[0]} is meant" if near else f"; known are {', '.join(known)}"
 
 
 def _line_of(text: str, key: str, table: str | None = None, index: int = 0) -> str:

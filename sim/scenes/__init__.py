@@ -52,7 +52,7 @@ def build_scene(
     """
     kind = SCENES.get(name)
     if kind is None:
-        raise OverrideError(f"there is no scene {name!r}; there are {', '.join(SCENES)}.")
+        raise OverrideError(f"There is no scene {name!r}; there are {', '.join(SCENES)}.")
     parameters = override(as_the_site_says(kind.parameters, site), changes)
     scene = kind.build(site, parameters, seed, start_ns)
     keyed = [replace(radar, key=(keys or {}).get(radar.site.number)) for radar in scene.radars]

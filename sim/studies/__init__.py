@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+STUDIES = ("fusion",)  # the modules of this package that have a `run`
+
 Progress = Callable[[str, float], None]  # what is being done, and the share of the whole that is done
 
 

@@ -31,6 +31,7 @@ Floats = NDArray[np.float64]
 
 ORANGE, BLUE, RED, GREY = [255, 140, 0], [60, 120, 255], [230, 30, 40], [150, 150, 150]
 CLOSING_S, START_OFF_M = 60.0, 500.0  # figure 4: how fast the position source closes in, and from where
+FOUR_S, FIVE_S = 1.5 * CLOSING_S, 460.0  # the figures' spans; the viewer can hold a range only about its cursor
 COMPONENTS = (("range", "m", 1.0), ("azimuth", "deg", 180.0 / math.pi), ("elevation", "deg", 180.0 / math.pi))
 
 
@@ -47,15 +48,10 @@ def draw(path: Path, seed: int) -> None:
 
 
 def _blueprint() -> rrb.Blueprint:
-    four = [
-        rrb.TimeSeriesView(origin=f"/figure_4/{name}", name=f"radar less GPS, {name} ({unit})")
-        for name, unit, _ in COMPONENTS
-    ]
-    counter = rrb.TimeSeriesView(origin="/figure_4/counter", name="counter, associated at 3")
-    five = [
-        rrb.TimeSeriesView(origin=f"/figure_5/{axis}", name=f"deviation from the truth, {axis} (m)")
-        for axis in ("along", "left", "up")
-    ]
+    four = [_plot(f"/figure_4/{name}", f"radar less GPS, {name} ({unit})", FOUR_S) for name, unit, _ in COMPONENTS]
+    counter = _plot("/figure_4/counter", "counter, associated at 3", FOUR_S)
+    axes = ("along", "left", "up")
+    five = [_plot(f"/figure_5/{axis}", f"deviation from the truth, {axis} (m)", FIVE_S) for axis in axes]
     tabs = rrb.Tabs(
         rrb.Vertical(*four, counter, name="Figure 4: association"),
         rrb.Vertical(*five, name="Figure 5: after association"),
@@ -64,9 +60,9 @@ def _blueprint() -> rrb.Blueprint:
     return rrb.Blueprint(tabs, rrb.TimePanel(timeline="time", state="collapsed"), collapse_panels=True)
 
 
-def _plot(origin: str, name: str) -> rrb.TimeSeriesView:
-    whole = rrb.TimeRange(rrb.TimeRangeBoundary.infinite(), rrb.TimeRangeBoundary.infinite())
-    return rrb.TimeSeriesView(origin=origin, name=name, axis_x=rrb.TimeAxis(view_range=whole))
+def _plot(origin: str, name: str, span_s: float) -> rrb.TimeSeriesView:
+    ends = (rrb.TimeRangeBoundary.cursor_relative(seconds=span) for span in (-span_s, span_s))
+    return rrb.TimeSeriesView(origin=origin, name=name, axis_x=rrb.TimeAxis(view_range=rrb.TimeRange(*ends)))
 
 
 def _series(

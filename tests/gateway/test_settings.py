@@ -203,7 +203,7 @@ def _swap(old: str, new: str) -> str:
 
 
 WRONG = {
-    "unknown key": (_swap("width_m = 45.0", "widht_m = 45.0"), 11, ["widht_m", "did you mean width_m"]),
+    "unknown key": (_swap("width_m = 45.0", "widht_m = 45.0"), 11, ["widht_m", "perhaps width_m is meant"]),
     "unknown key of a radar": (_swap("along_m = 300.0", "distance_m = 300.0"), 19, ["distance_m", "[[radar]]"]),
     "wrong unit": (_swap("glide_path_deg = 3.0", "glide_path_rad = 0.05"), 12, ["glide_path_rad", "glide_path_deg"]),
     "length in feet": (_swap("length_m = 3000.0", "length_ft = 9842"), 10, ["length_ft", "length_m"]),
@@ -218,7 +218,7 @@ WRONG = {
     "radar number 0": (_swap("number = 1", "number = 0"), 18, ["number", "whole number"]),
     "radar number of a fraction": (_swap("number = 1", "number = 1.5"), 18, ["number", "whole number"]),
     "units of another kind": (_swap('units = "si"', 'units = "imperial"'), 3, ["units", "si, aviation"]),
-    "unknown table": (_swap("[position]", "[postion]"), 14, ["postion", "did you mean position"]),
+    "unknown table": (_swap("[position]", "[postion]"), 14, ["postion", "perhaps position is meant"]),
     "unknown key at the top": ("colour = 1\n" + EXAMPLE, 1, ["colour"]),
     "name of a number": (_swap('name = "Demo field"', "name = 3"), 1, ["name", "text"]),
     "runway as a list": (_swap("[runway]", "[[runway]]"), 4, ["[runway]"]),

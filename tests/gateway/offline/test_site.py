@@ -19,7 +19,7 @@ LATITUDE, LONGITUDE = math.radians(31.0), math.radians(104.0)
 
 def _standing(count: int = 10, **values: float | None) -> list[GpsReport]:
     report = GpsReport("mavlink:1", 0, 0, LATITUDE, LONGITUDE, altitude_msl_m=500.0, compass_heading_rad=1.0)
-    return [replace(report, valid_at=second * SECOND, **values) for second in range(count)]  # type: ignore[arg-type]
+    return [replace(report, valid_at=second * SECOND, received_at=second * SECOND, **values) for second in range(count)]  # type: ignore[arg-type]
 
 
 def _plan(*points: PlanPoint) -> FlightPlan:
