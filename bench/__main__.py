@@ -43,7 +43,7 @@ def bench(
 ) -> None:
     """Measure what Talkdown costs on this machine. Best on a quiet one: figures are medians, ranges stand beside them."""
     wanted = set(only or Part) - (set() if long or only else {Part.hours})
-    console = Console()
+    console = Console(width=max(Console().width, 110))
     console.print(f"{machine()}; {load()}")
     figures = _measure(wanted, runs, seconds, Console(stderr=True))
     console.print(_table(figures))
