@@ -169,4 +169,4 @@ def _intervals(key: str, text: str) -> Intervals:
 
 def _meant(name: str, known: list[str]) -> str:
     near = get_close_matches(name, known, n=1)
-    return f"; did you mean {near[0]}?" if near else f"; known are {', '.join(known)}"
+    return f"; perhaps {near[0]} is meant" if near else f"; known are {', '.join(known)}"

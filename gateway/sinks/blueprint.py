@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import rerun.blueprint as rrb
 
 from gateway.settings import Site
@@ -100,11 +102,12 @@ def scope_view(site: Site) -> rrb.Spatial2DView:
 
 def map_view(site: Site) -> rrb.MapView:
     """The same from above; geo data only, so that it reads without tiles."""
+    closer = math.log2(50_000.0 / max(approach_reach_m(site), 500.0))  # each level shows half of the one before
     return rrb.MapView(
         origin="/",
         name="Map",
         contents=["/site/**", "/raw/**", "/fuse/**", "/predict/**", "/truth/**"],
-        zoom=10.0,
+        zoom=10.0 + closer,
     )
 
 
