@@ -53,9 +53,9 @@ def test_a_latency_bound_moved_past_the_other_takes_it_along() -> None:
     [
         ("gps.period_s", "write KEY=VALUE"),
         ("gps.period_s=", "write KEY=VALUE"),
-        ("gps.periods_s=1", "did you mean period_s"),
+        ("gps.periods_s=1", "perhaps period_s is meant"),
         ("gsp.period_s=1", "unknown group 'gsp'"),
-        ("aircrafts=3", "did you mean aircraft"),
+        ("aircrafts=3", "perhaps aircraft is meant"),
         ("radar7.period_s=1", "add radars=7"),
         ("gps.period_s=fast", "must be a number"),
         ("gps.period_s=0", "must be above 0"),
