@@ -10,6 +10,7 @@ track do not depend on how many come along.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,11 +75,28 @@ def predict(state: Estimate, elapsed_s: Floats, motion: Motion) -> Estimate:
 
     Source: 003 2.4 eq 17, 18.
     """
+    if len(elapsed_s) == 1:  # one track worked again after late data sees the same intervals again
+        carry, noise = _over(motion, float(elapsed_s[0]))
+    else:
+        carry, noise = _carried(motion, elapsed_s)
+    mean = (carry @ state.mean[:, :, None])[:, :, 0]
+    return Estimate(mean, carry @ state.covariance @ carry.transpose(0, 2, 1) + noise)
+
+
+def _carried(motion: Motion, elapsed_s: Floats) -> tuple[Floats, Floats]:
+    """Transition and noise matrices (n, 9, 9) over times (n,)."""
     t = elapsed_s[:, None, None]
     keep = np.exp(t / -motion.error_time_constant_s)
-    carry = _UNCHANGED + t * _VELOCITY_MOVES + keep * _ERROR_STAYS
-    mean = (carry @ state.mean[:, :, None])[:, :, 0]
-    return Estimate(mean, carry @ state.covariance @ carry.transpose(0, 2, 1) + motion.noise(t, keep))
+    return _UNCHANGED + t * _VELOCITY_MOVES + keep * _ERROR_STAYS, motion.noise(t, keep)
+
+
+@lru_cache(maxsize=4096)
+def _over(motion: Motion, elapsed_s: float) -> tuple[Floats, Floats]:
+    """The same over one time, remembered; nobody may write into them."""
+    carry, noise = _carried(motion, np.array([elapsed_s]))
+    carry.setflags(write=False)
+    noise.setflags(write=False)
+    return carry, noise
 
 
 def _blocks(*places: tuple[slice, slice], scale: float = 1.0) -> Floats:
@@ -102,8 +120,8 @@ def update(
 ) -> tuple[Estimate, Innovation]:
     """One measurement for each of n tracks; components that are NaN in `innovation` (n, m) are left out.
 
-    `sensitivity` (n, m, 9) is the measurement's derivative by the state, `variance` (n, m) of independent noise. With
-    `robust` (a number of sigmas for each degree of freedom), a measurement further out than that has its noise raised
+    `sensitivity` (n, m, 9) or (1, m, 9) is the measurement's derivative by the state, `variance` (n, m) that of its
+    independent noise. With `robust` (sigmas for each degree of freedom), what lies further out has its noise raised
     until it is just there (Huber's weight): an outlier pulls no more than a bounded amount, and a source that really has
     jumped is followed all the same.
     Joseph's form: the covariance stays symmetric and positive whatever the rounding.

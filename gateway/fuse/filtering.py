@@ -94,13 +94,18 @@ def _advance(
     for (kind, radar), members in groups.items():
         rows, before, chosen, seen = zip(*members, strict=True)
         elapsed_s = np.array([(measure.at - base.at) / SECOND for base, measure in zip(before, chosen, strict=True)])
-        state = Estimate(np.array([base.mean for base in before]), np.array([base.covariance for base in before]))
-        memory = np.array([base.memory for base in before])
+        state = Estimate(_stacked([base.mean for base in before]), _stacked([base.covariance for base in before]))
+        memory = _stacked([base.memory for base in before])
         state = predict(state, elapsed_s, model.motion)
         after, outlying, memory = _update(kind, radar, state, chosen, seen, memory, model)
         for i, row in enumerate(rows):
             events[row] = _event(chosen[i], after, i, memory[i], before[i], bool(outlying[i]))
     return [events[row] for row in range(len(measures))]
+
+
+def _stacked(rows: Sequence[Floats]) -> Floats:
+    """Arrays as the rows of one; a single one, the usual case, is not copied."""
+    return rows[0][None] if len(rows) == 1 else np.array(rows)
 
 
 def _group(measure: Measure, near: Near | None) -> tuple[str, int]:
@@ -126,13 +131,13 @@ def _update(
         after, told = update_with_plots(state, polar, sigma, model.radars[radar])
         return after, told.outlying, memory
     fixes = [measure for measure in measures if isinstance(measure, Fix)]
-    position, sigma = np.array([fix.enu_m for fix in fixes]), np.array([fix.sigma_m for fix in fixes])
+    position, sigma = _stacked([fix.enu_m for fix in fixes]), _stacked([fix.sigma_m for fix in fixes])
     if kind == "literal":
         seen = [one for one in near if one is not None]
         polar, spread = np.array([one[1] for one in seen]), np.array([one[2] for one in seen])
         after, told = update_literally(state, position, sigma, polar, spread, model.radars[radar])
         return after, told.outlying, memory
-    velocity = np.array([fix.velocity_mps for fix in fixes])
+    velocity = _stacked([fix.velocity_mps for fix in fixes])
     speed_sigma = np.array([fix.velocity_sigma_mps for fix in fixes])
     after, told, memory = update_with_fixes(state, position, sigma, velocity, speed_sigma, memory, model)
     return after, told.outlying, memory

@@ -30,7 +30,7 @@ LEAST_RESIDUAL = 1e-3  # sigmas; the literal weights are singular at a residual 
 AXES = np.arange(3)
 
 # What a GPS report measures of the state: position (and, where the source may be wrong, its error), and velocity.
-_FIX = np.eye(6, SIZE)
+_FIX = np.eye(6, SIZE)[None]
 _FIX_WITH_ERROR = _FIX + np.eye(6, SIZE, 6)
 
 
@@ -98,7 +98,7 @@ def update_with_fixes(
     """States after GPS reports; arrays as in `start_from_fixes`; memory (n, w, 3) of past position innovations."""
     n = len(position)
     has_error = bool(model.motion.error_sigma_m)
-    sensitivity = np.broadcast_to(_FIX_WITH_ERROR if has_error else _FIX, (n, 6, SIZE))
+    sensitivity = _FIX_WITH_ERROR if has_error else _FIX
     expected = state.mean[:, POSITION]
     if has_error:
         expected = expected + state.mean[:, ERROR]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
+import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +13,6 @@ from gateway.runtime.inputs import SessionInput
 from gateway.runtime.outputs import RRD_FILE
 from gateway.sinks.parquet import finish, unfinished
 
-_OPTIMIZE_TIMEOUT_S = 120.0
 _UNTOLD_NS = 2_000_000_000  # rows are not further ahead of session.json; a stream at another speed has another clock
 
 
@@ -100,13 +98,9 @@ def _watermark(folder: Path, record: Record) -> int:
 
 
 def _repair_rrd(path: Path) -> None:
-    """Give a recording that was cut its footer back; without it the file still opens, so failing here is no failure."""
-    if not path.exists():
-        return
-    part = path.with_name(path.name + ".part")
-    command = [sys.executable, "-m", "rerun", "rrd", "optimize", str(path), "-o", str(part)]
-    try:
-        subprocess.run(command, check=True, capture_output=True, timeout=_OPTIMIZE_TIMEOUT_S)
-        part.replace(path)
-    except (OSError, subprocess.SubprocessError):
-        part.unlink(missing_ok=True)
+    """Give a recording that was cut its index; without it the file still opens, so failing here is no failure."""
+    from gateway.sinks.recording import optimise  # knows the viewer, which listing does not need
+
+    if path.exists():
+        with contextlib.suppress(OSError):
+            optimise(path)
