@@ -20,7 +20,7 @@ from gateway.align import SECOND, Fix, Plot, bracket
 from gateway.frames import RadarFrame, RunwayFrame
 from gateway.fuse.filtering import Event, Job, Near, Neighbour, rank
 from gateway.fuse.filtering import run as run_filter
-from gateway.fuse.lanes import begin
+from gateway.fuse.placing import begin
 from gateway.fuse.weighting import Model
 from gateway.settings import Options, Weighting
 from gateway.track import Key, Place, RadarTracks

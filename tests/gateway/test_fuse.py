@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gateway.estimators.kalman import ERROR, POSITION, VELOCITY, Estimate
 from gateway.frames import polar_from_xyz, xyz_from_polar
 from gateway.fuse.filtering import Event, Job, run
-from gateway.fuse.lanes import begin
+from gateway.fuse.placing import begin
 from gateway.fuse.weighting import (
     Model,
     polar_difference,
