@@ -53,7 +53,7 @@ ViewerOption = Annotated[
     Viewer | None,
     typer.Option(
         "--viewer",
-        help="native: a window; web: an address for the browser; none. [default: native, web without a screen]",
+        help="native: a window; web: an address for the browser; none. (default: native, web without a screen)",
         show_default=False,
     ),
 ]
@@ -62,7 +62,7 @@ ServeOption = Annotated[
     typer.Option(
         "--serve",
         metavar="HOST:PORT",
-        help="Where viewers find the session, such as 0.0.0.0:9876 for a network. [default: this machine, a free port]",
+        help="Where viewers find the session, such as 0.0.0.0:9876 for a network. (default: this machine, a free port)",
         show_default=False,
     ),
 ]

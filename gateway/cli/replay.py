@@ -32,6 +32,27 @@ FilesArgument = Annotated[
 ]
 
 
+SpeedOption = Annotated[
+    str | None,
+    typer.Option(
+        "--speed",
+        metavar="max|N",
+        help="N times its own pace. (default: 1 with a viewer, max without)",
+        show_default=False,
+    ),
+]
+WeightingOption = Annotated[
+    take.Weighting | None,
+    typer.Option(
+        "--weighting", help="How GPS and radar are weighed. (default: the session's, else bias)", show_default=False
+    ),
+]
+AssociationOption = Annotated[
+    take.Association | None,
+    typer.Option("--association", help="When two are one. (default: the session's, else default)", show_default=False),
+]
+
+
 def register(app: typer.Typer) -> None:
     """Add the command."""
     app.command("replay", help=_HELP)(replay)
@@ -55,30 +76,12 @@ def read_speed(text: str | None, default: float | None) -> float | None:
 def replay(
     files: FilesArgument,
     site: take.SiteOption = None,
-    speed: Annotated[
-        str | None,
-        typer.Option(
-            "--speed",
-            metavar="max|N",
-            help="N times its own pace. [default: 1 with a viewer, max without]",
-            show_default=False,
-        ),
-    ] = None,
+    speed: SpeedOption = None,
     viewer: take.ViewerOption = None,
     serve: take.ServeOption = None,
     archive: take.ArchiveOption = None,
-    weighting: Annotated[
-        take.Weighting | None,
-        typer.Option(
-            "--weighting", help="How GPS and radar are weighed. [default: the session's, else bias]", show_default=False
-        ),
-    ] = None,
-    association: Annotated[
-        take.Association | None,
-        typer.Option(
-            "--association", help="When two are one. [default: the session's, else default]", show_default=False
-        ),
-    ] = None,
+    weighting: WeightingOption = None,
+    association: AssociationOption = None,
     quiet: take.QuietOption = False,
     json: take.JsonOption = False,
 ) -> None:

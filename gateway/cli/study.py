@@ -37,7 +37,7 @@ def study(
     seed: Annotated[int, typer.Option("--seed", metavar="N", help="Of the random numbers.")] = 1,
     rrd: Annotated[
         Path | None,
-        typer.Option("--rrd", metavar="FILE", help="Where the figures go. [default: NAME.rrd]", show_default=False),
+        typer.Option("--rrd", metavar="FILE", help="Where the figures go. (default: NAME.rrd)", show_default=False),
     ] = None,
     quiet: take.QuietOption = False,
     json: take.JsonOption = False,
