@@ -137,7 +137,7 @@ def _inserted(lanes: Lanes, lane: Lane, measure: Measure, scene: Scene) -> tuple
         following = [*(event.measure for event in events[touched:place]), *following]
         place = touched
     job = Job(lane.track, events[place - 1] if place else None, following, scene.neighbour(lane), measure.serial)
-    return lanes.with_lane(replace(lane, events=events[:place])), job
+    return lanes.with_lane(lane.with_events(events[:place])), job
 
 
 def _rebuilt(lanes: Lanes, lane: Lane, at: int, scene: Scene) -> tuple[Lanes, Job | None]:
@@ -154,7 +154,7 @@ def _rebuilt(lanes: Lanes, lane: Lane, at: int, scene: Scene) -> tuple[Lanes, Jo
             keep = 0
         plots = _free_plots(lane, scene)
         measures = [*begin(plots)] if not keep else [p for p in plots if p.at >= at]
-    lane = replace(lane, events=lane.events[:keep])
+    lane = lane.with_events(lane.events[:keep])
     lanes = lanes.with_lane(lane)
     base = lane.events[-1] if keep else None
     if base is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,10 +84,10 @@ def work(
     outliers = 0
     for job, events in zip(jobs, run(jobs, model), strict=True):
         lane = lanes.lanes[job.track]
-        changed[lane.track] = replace(lane, events=(*lane.events, *events))
+        changed[lane.track] = lane.with_events((*lane.events, *events))
         rows += [row_of(lane, event, spans, separation_m) for event in events]
         outliers += sum(event.outlying and event.measure.serial == job.fresh for event in events)
-    return replace(lanes, lanes={**lanes.lanes, **changed}), rows, outliers
+    return lanes.with_lanes(changed), rows, outliers
 
 
 def coast(lanes: Sequence[Lane], at: int, spans: Sequence[Span], separation_m: float, model: Model) -> list[Row]:
