@@ -206,13 +206,3 @@ def open_recording(path: Path, first_number: int = 0) -> Recording:
             f"{path} is a .{kind} file, which cannot be replayed yet: give the .tlog of the same flight, or a .pcap or .pcapng."
         )
     return Recording(path, kind, first_number)
-
-
-def last_stamp(path: Path) -> int | None:
-    """The stamp of the last whole record of a .tlog or capture; None where there is none."""
-    with path.open("rb") as file:
-        beginning = file.read(4)
-        file.seek(0)
-        if is_capture(beginning):
-            return max((captured.received_at for captured in PcapReader(file)), default=None)
-        return max((stamp for stamp, _ in TlogReader(file)), default=None)

@@ -97,7 +97,6 @@ class MavlinkObserver:
     def _role(self, component: Component, frame: Frame) -> None:
         kind, autopilot, _, _ = _read_heartbeat(frame.payload)
         component.is_vehicle = autopilot != INVALID_AUTOPILOT and kind not in STATIONS
-        component.has_heartbeat = True
 
     def _heartbeat(self, heard: _Heard) -> Observations:
         kind, autopilot, base_mode, custom_mode = _read_heartbeat(heard.payload)

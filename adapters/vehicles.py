@@ -61,7 +61,6 @@ class Component:
 
     key: tuple[int, int, int]
     is_vehicle: bool
-    has_heartbeat: bool = False
     clock: SourceClock = field(default_factory=SourceClock)
     sequence: SequenceCheck = field(default_factory=SequenceCheck)
     reboots_told: int = 0

@@ -55,7 +55,6 @@ class Plot:
     number: int
     polar: Polar
     sigma: Polar
-    begins: bool = False  # a plot completed from its neighbours, from which a track starts
 
 
 @dataclass(frozen=True, slots=True)

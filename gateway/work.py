@@ -84,6 +84,11 @@ class Work:
         self.lanes = lanes.pruned(before)
         self.tracks = self.tracks.pruned(before - int(PLOT_MARGIN_S * SECOND))
         gone = associate.missing(self.association, self.tracks)
+        for key, aircraft in self.association.ledger.pairs.items():
+            if key in gone:
+                self.events.append(
+                    Event(at, "info", f"radar track {track.name_of(key)}, {aircraft}, has fallen silent")
+                )
         self.association = associate.pruned(associate.forgotten(self.association, gone), before)
         if self.reported:
             self.reported = frozenset(change for change in self.reported if change.at >= before - 60 * SECOND)

@@ -14,6 +14,7 @@ from gateway.track import Key, name_of
 
 FAST_CHECKS_S = 2.0  # checks closer together than this need FAST_HITS of them: their errors are alike
 FAST_HITS = 5
+RIVAL_AGE_S = 30.0  # an aircraft that was last checked longer ago than this is nobody's rival
 RIVAL_RATIO = 1.5  # a pair is taken only if every rival's mean distance is this many times its own
 
 
@@ -90,7 +91,7 @@ def count(
             hits = min(old.hits + 1, 10)
             mean = old.distance + (comparison.distance - old.distance) / hits
             counts[pair] = Count(min(old.value + 1, full), mean, hits)
-        elif old.value > 1 or pair[1] in pairs:
+        elif old.value > 1 or pairs.get(pair[1]) == aircraft:
             counts[pair] = Count(max(old.value - 1, 0), old.distance, old.hits)
         else:
             counts.pop(pair, None)
@@ -104,7 +105,9 @@ def count(
     for key in [key for key, owner in pairs.items() if owner == aircraft]:
         if key in alive and counts.get((aircraft, key), Count(0, 0.0, 0)).value == 0:
             lose(key)
-    for key in _assign(counts, pairs, aircraft, full, alive):
+    checked_at = {**ledger.checked_at, aircraft: fix.at}
+    forgotten = {owner for owner, at in checked_at.items() if fix.at - at > RIVAL_AGE_S * SECOND}
+    for key in _assign(counts, pairs, aircraft, full, alive, forgotten):
         for other in [k for k, owner in pairs.items() if owner == aircraft and k[0] == key[0]]:
             lose(other)  # its number changed: the old one is silent
         pairs[key] = aircraft
@@ -117,7 +120,7 @@ def count(
         now = {span.key for span in gone if span.until is None}
         begun = [(key, owner) for key, owner in pairs.items() if key not in now]
         spans = (*gone, *(Span(key, owner, fix.at, None, _latest_index(gone, key) + 1) for key, owner in begun))
-    return Ledger(counts, pairs, spans, {**ledger.checked_at, aircraft: fix.at}), tuple(changes)
+    return Ledger(counts, pairs, spans, checked_at), tuple(changes)
 
 
 def _of(counts: Mapping[tuple[str, Key], Count], aircraft: str) -> list[tuple[str, Key]]:
@@ -125,7 +128,12 @@ def _of(counts: Mapping[tuple[str, Key], Count], aircraft: str) -> list[tuple[st
 
 
 def _assign(
-    counts: Mapping[tuple[str, Key], Count], pairs: Mapping[Key, str], aircraft: str, full: int, alive: frozenset[Key]
+    counts: Mapping[tuple[str, Key], Count],
+    pairs: Mapping[Key, str],
+    aircraft: str,
+    full: int,
+    alive: frozenset[Key],
+    forgotten: set[str],
 ) -> list[Key]:
     """The radar tracks, at most one of each radar, that this aircraft now becomes one with.
 
@@ -148,9 +156,8 @@ def _assign(
         distance, best = min(ready)
         rivals = [d for d, key in mine if key != best and key not in pairs and key in alive]
         owned = {owner for key, owner in pairs.items() if key[0] == radar and key in alive}
-        rivals += [
-            c.distance for (owner, key), c in counts.items() if key == best and owner != aircraft and owner not in owned
-        ]
+        out = owned | forgotten | {aircraft}
+        rivals += [c.distance for (owner, key), c in counts.items() if key == best and owner not in out]
         if all(rival >= RIVAL_RATIO * distance for rival in rivals):
             taken.append(best)
     return taken

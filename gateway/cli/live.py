@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
+
+if TYPE_CHECKING:
+    from gateway.runtime.links import Link
 
 _HELP = """
 Fuse what aircraft and radars say now: align, associate, fuse, predict, draw, archive.
@@ -52,6 +55,13 @@ def register(app: typer.Typer) -> None:
     app.command("live", help=_HELP)(live)
 
 
+def buffer_of(link: Link) -> str:
+    """What the system granted for a burst; it may be less than was asked for, and says so nowhere else."""
+    from gateway.runtime.links import UdpLink
+
+    return f" The system holds {link.granted_bytes // 1024} KiB for it." if isinstance(link, UdpLink) else ""
+
+
 def live(
     mavlink: MavlinkOption = None,
     radar: RadarOption = None,
@@ -71,7 +81,7 @@ def live(
     from gateway.cli.display import Display
     from gateway.cli.viewing import Viewing, chosen
     from gateway.runtime.folder import FolderError
-    from gateway.runtime.links import Link, open_link
+    from gateway.runtime.links import open_link
     from gateway.runtime.loop import run_live
     from gateway.runtime.setup import RunFailure, Setup
     from gateway.runtime.signals import StopSignals
@@ -95,7 +105,7 @@ def live(
                 links[group].append(open_link(url))
         with StopSignals() as stop, Viewing(looks) as viewing, Display(viewing, quiet=quiet, as_json=json) as display:
             for link in (*links[0], *links[1]):
-                display.say(f"Listening on {link.url}.")
+                display.say(f"Listening on {link.url}.{buffer_of(link)}")
             summary = run_live(links[0], links[1], setup, seconds=seconds, watch=display.watch, asked_to_stop=stop)
         display.show(summary)
     except (LinkError, FolderError) as error:

@@ -210,8 +210,6 @@ def begin(plots: Sequence[Plot]) -> list[Measure]:
                     sigma[component] += moved_m if component == 0 else moved_m / max(polar[0], 300.0)
                     break
         if not any(map(math.isnan, polar)):
-            first = replace(
-                plot, polar=(polar[0], polar[1], polar[2]), sigma=(sigma[0], sigma[1], sigma[2]), begins=True
-            )
+            first = replace(plot, polar=(polar[0], polar[1], polar[2]), sigma=(sigma[0], sigma[1], sigma[2]))
             return [first, *plots[place + 1 :]]
     return []

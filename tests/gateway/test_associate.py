@@ -322,3 +322,24 @@ def test_a_report_that_comes_late_is_checked_in_its_place(world: Any) -> None:
     assert changes[-1].at == world.at(10.13)
     assert changes[-1].kind == "associated"
     assert ran.state.association.ledger.pairs == {(1, 3, 0): ONE}
+
+
+# who is a rival -------------------------------------------------------------------------------------------------------
+
+
+def test_an_aircraft_that_is_gone_is_nobodys_rival(world: Any) -> None:
+    """One that was nearer for two checks and was never heard again does not keep the track from the one that stays."""
+    course = world.Course()
+    gone = _fixes(world, course, [0.9, 5.9], aircraft="mavlink:9")
+    stays = _fixes(world, course, [40.9, 45.9, 50.9, 55.9], off_m=(0.0, 60.0, 0.0))
+    assert _checked(world, [*gone, *stays], _plots(world, course)).pairs == {"1/3": ONE}
+
+
+def test_a_miss_against_anothers_track_leaves_no_counter(world: Any) -> None:
+    """An aircraft 800 m beside one that has its radar track never counts for that track, so it is no rival later."""
+    course = world.Course()
+    mine = _fixes(world, course, FIVE_SECONDS)
+    other = _fixes(world, course, [t + 1.5 for t in FIVE_SECONDS], aircraft="mavlink:9", off_m=(0.0, 800.0, 0.0))
+    told = _checked(world, [*mine, *other], _plots(world, course))
+    assert told.pairs == {"1/3": ONE}
+    assert {owner for owner, _ in told.state.ledger.counts} == {ONE}

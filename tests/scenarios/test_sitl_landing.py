@@ -80,7 +80,7 @@ def fused_with_radar(recording: Path, talkdown: Talkdown, folder: Path, site: Pa
     return read(Path(outcome.summary["archive"]))
 
 
-def proves_the_landing(table: Table, radar_track: str) -> None:
+def assert_it_lands(table: Table, radar_track: str) -> None:
     """Joined with the radar, fused down to the runway, near the truth all the way."""
     fused = np.array([state == "fused" for state in table.state])
     assert fused.any()
@@ -96,14 +96,14 @@ def proves_the_landing(table: Table, radar_track: str) -> None:
 
 def test_the_last_minute_of_a_sitl_flight_is_fused_down_to_the_runway(talkdown: Talkdown, tmp_path: Path) -> None:
     """Without a site file: the place comes from the recording, the radar's from its own status."""
-    proves_the_landing(fused_with_radar(EXCERPT, talkdown, tmp_path, None), "1/1")
+    assert_it_lands(fused_with_radar(EXCERPT, talkdown, tmp_path, None), "1/1")
 
 
 def test_with_a_site_file_the_radar_stands_where_the_file_says(talkdown: Talkdown, tmp_path: Path) -> None:
     """The proposed site with a radar added by hand is used as it is written."""
     site = tmp_path / "field.toml"
     site.write_text(talkdown("site", EXCERPT).out + RADAR_SITE)
-    proves_the_landing(fused_with_radar(EXCERPT, talkdown, tmp_path, site), "4/1")
+    assert_it_lands(fused_with_radar(EXCERPT, talkdown, tmp_path, site), "4/1")
 
 
 def test_alone_the_recording_gives_the_autopilots_track(talkdown: Talkdown, tmp_path: Path) -> None:
@@ -120,5 +120,5 @@ def test_alone_the_recording_gives_the_autopilots_track(talkdown: Talkdown, tmp_
 def test_the_whole_sitl_flight_is_fused_down_to_the_runway(talkdown: Talkdown, tmp_path: Path) -> None:
     """Thirteen minutes with take-off, circuits and landing, joined once and never lost."""
     table = fused_with_radar(WHOLE, talkdown, tmp_path, None)
-    proves_the_landing(table, "1/1")
+    assert_it_lands(table, "1/1")
     assert table.state.count("fused") > 0.9 * len(table.state)

@@ -100,7 +100,9 @@ def test_closing_twice_is_closing_once(tmp_path, pictures):
     sink = RerunSink(DEMO_SITE, path=tmp_path / "session.rrd", serve=("127.0.0.1", 0))
     sink.write(pictures(0.2)[0])
     sink.close()
+    written = (tmp_path / "session.rrd").read_bytes()
     sink.close()
+    assert (tmp_path / "session.rrd").read_bytes() == written
 
 
 def test_what_is_not_the_known_encoding_is_refused_in_plain_words():
