@@ -41,6 +41,13 @@ class GpsReport:
     velocity_sigma_mps: float | None = None
     compass_heading_rad: float | None = None  # where the nose points, clockwise from true north
     timing: Timing = Timing.UTC
+    pressure_altitude_m: float | None = (
+        None  # above the 1013.25 hPa surface (or a QNH's): never mixed with the other two
+    )
+    timing_sigma_s: float = (
+        0.0  # of `valid_at`, where it was told in coarse steps (tslc of ADSB_VEHICLE: whole seconds)
+    )
+    callsign: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +99,38 @@ class Attitude:
 
 
 @dataclass(frozen=True, slots=True)
+class ImuSample:
+    """One sample of an inertial unit, along the body's axes: x forward, y right, z down. Sensors count from 1."""
+
+    aircraft: str
+    valid_at: int
+    received_at: int
+    sensor: int
+    acceleration_mps2: tuple[float, float, float] | None = None  # specific force: at rest (0, 0, -9.81)
+    angular_rate_radps: tuple[float, float, float] | None = None
+    magnetic_field_gauss: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AirData:
+    """What a vehicle says of the air: speeds, pressures, and the wind it has estimated (where the air moves TO)."""
+
+    aircraft: str
+    valid_at: int
+    received_at: int
+    airspeed_mps: float | None = None
+    groundspeed_mps: float | None = None
+    climb_mps: float | None = None
+    altitude_msl_m: float | None = None
+    static_pressure_pa: float | None = None
+    differential_pressure_pa: float | None = None
+    temperature_k: float | None = None
+    wind_east_mps: float | None = None
+    wind_north_mps: float | None = None
+    wind_up_mps: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleStatus:
     """What a vehicle says of itself: its kind, whether it is armed, its mode as a number of its autopilot."""
 
@@ -102,6 +141,7 @@ class VehicleStatus:
     autopilot: int
     armed: bool
     custom_mode: int
+    landed: str | None = None  # "on ground", "in air", "taking off", "landing"; None where it does not say
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +167,21 @@ class PlanPoint:
 
 
 @dataclass(frozen=True, slots=True)
+class Intent:
+    """Where a vehicle says that it goes next: a point, or the item of its plan with this sequence number, or both."""
+
+    aircraft: str
+    valid_at: int
+    received_at: int
+    told_by: str  # "utm", "mission", "high latency"
+    sequence: int | None = None
+    latitude_rad: float | None = None
+    longitude_rad: float | None = None
+    altitude_msl_m: float | None = None
+    height_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Truth:
     """Where a simulator says the aircraft really is. Archived, drawn and scored against; never reaches a stage."""
 
@@ -143,7 +198,9 @@ class Truth:
     mode: str | None = None
 
 
-Observation = GpsReport | RadarPlot | RadarStatus | Attitude | VehicleStatus | FlightPlan | Truth
+Observation = (
+    GpsReport | RadarPlot | RadarStatus | Attitude | ImuSample | AirData | VehicleStatus | FlightPlan | Intent | Truth
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,10 +26,29 @@ class SourceHealth:
 
 
 @dataclass(frozen=True, slots=True)
+class VehicleHealth:
+    """How one vehicle is heard, and what it last said of itself.
+
+    `readings` and `words` are for people: names with their unit ("airspeed, m/s", 21.3) and ("landed", "on ground").
+    """
+
+    aircraft: str
+    clock: str  # where its time comes from: "UTC", "least delay", "not settled", "foreign"
+    clock_sigma_s: float  # how well its time is known, 1 sigma; NaN = not known yet
+    delay_s: (
+        float  # the median over the last minute of how much longer than the fastest its frames took; NaN = not known
+    )
+    delay_99_s: float  # and its 99th percentile
+    readings: tuple[tuple[str, float], ...] = ()
+    words: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Health:
-    """The state of every source and of the gateway itself."""
+    """The state of every source, of every vehicle, and of the gateway itself."""
 
     sources: tuple[SourceHealth, ...] = ()
+    vehicles: tuple[VehicleHealth, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,9 +14,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, cast
 
-from adapters import Source
+from adapters import Kind, Source
 from gateway.settings import Options
 
 SESSION_FILE = "session.json"
@@ -34,7 +34,7 @@ class InputFile:
     """One source of a session and the file that holds what it sent."""
 
     number: int
-    kind: Literal["mavlink", "radar"]
+    kind: Kind
     name: str
     origin: str
     file: str  # relative to the session's folder

@@ -10,6 +10,20 @@ AssociationRule = Literal["default", "literal"]
 
 
 @dataclass(frozen=True, slots=True)
+class Mute:
+    """A source that is not listened to for a while, to see what would be without it: from `since` up to `until`.
+
+    What: "gps" (all positions that aircraft report) or "radar"; `number` is the radar's or vehicle's, None for all.
+    Times are receiver's stamps, ns since 1970 UTC.
+    """
+
+    what: Literal["gps", "radar"]
+    number: int | None
+    since: int
+    until: int
+
+
+@dataclass(frozen=True, slots=True)
 class Options:
     """What may be chosen for a run; everything in here changes numbers, so all of it is archived."""
 
@@ -25,3 +39,5 @@ class Options:
     end_after_s: float = 30.0  # and for this long it ends
     prediction_period_s: float = 1.0
     horizons_s: tuple[float, ...] = (10.0, 30.0, 60.0)
+    begins_at: int | None = None  # stamp; what came before is heard for its clocks, plans and places, and not fused
+    mutes: tuple[Mute, ...] = ()
