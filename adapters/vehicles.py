@@ -43,6 +43,8 @@ class Vehicle:
     has_sim_state: bool = False
     fix_notes: int = 0
     had_fix: bool = False
+    readings: dict[str, float] = field(default_factory=dict)  # what it last said, for people: "airspeed, m/s": 21.3
+    words: dict[str, str] = field(default_factory=dict)  # and in words: "landed": "on ground"
     recent: deque[tuple[int, int, int, bytes]] = field(default_factory=lambda: deque(maxlen=512))
 
     def is_echo(self, frame: tuple[int, int, int, bytes]) -> bool:
