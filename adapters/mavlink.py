@@ -233,7 +233,7 @@ class MavlinkObserver:
         vehicle = self.registry.of_number(
             component.key[0], frame.system if component.is_vehicle else told.target_system
         )
-        if not told.is_flight_plan or vehicle is None or not vehicle.plan.hear(told):
+        if not told.act or vehicle is None or not vehicle.plan.hear(told, by_vehicle=component.is_vehicle):
             return ()
         if component.is_vehicle and component.clock.has_been_heard():
             valid_at, _ = self._time(component, component.clock.boot_at(received_at), received_at)

@@ -1,114 +1,181 @@
 """Flight plans overheard: mission items that a vehicle tells or is told, and its home, become one plan.
 
-Mission altitudes above home stay so; terrain altitudes are left out. Points without a position are no points of a plan.
+    MISSION_COUNT (44)           a transfer begins: so many items; 0 = there is no mission
+    MISSION_ITEM (39)            x, y in degrees; MISSION_ITEM_INT (73): degE7; z in m, above what `frame` says:
+                                 0, 5 mean sea level; 3, 6 home; 10, 11 the terrain
+    MISSION_ACK (47)             a vehicle that refuses what it was sent keeps the plan it had
+    MISSION_CLEAR_ALL (45)       no mission any more
+
+Mission altitudes above home stay so; terrain altitudes are left out. Items without a position, and those that are no place
+to pass (commands to be done, a region of interest), are no points of a plan. Item 0 of ArduPilot is a copy of home; of
+PX4 it is the first point. An item that is marked 2 or 3 is a guided target or a change of altitude and no item.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from adapters.mavlink_frames import fields
 from gateway.observation import PlanPoint
 
-_ITEM = ("seq", "command", "frame", "x", "y", "z", "target_system", "mission_type")
+_ITEM = ("seq", "command", "frame", "x", "y", "z", "target_system", "mission_type", "current")
 MISSION_COUNT, _read_count = fields("MISSION_COUNT", "count", "target_system", "mission_type")
 MISSION_ITEM, _read_item = fields("MISSION_ITEM", *_ITEM)
 MISSION_ITEM_INT, _read_item_int = fields("MISSION_ITEM_INT", *_ITEM)
-MISSION_MESSAGES = frozenset((MISSION_COUNT, MISSION_ITEM, MISSION_ITEM_INT))
+MISSION_ACK, _read_ack = fields("MISSION_ACK", "type", "target_system", "mission_type")
+MISSION_CLEAR_ALL, _read_clear = fields("MISSION_CLEAR_ALL", "target_system", "mission_type")
+MISSION_MESSAGES = frozenset((MISSION_COUNT, MISSION_ITEM, MISSION_ITEM_INT, MISSION_ACK, MISSION_CLEAR_ALL))
 
 _KINDS = {16: "waypoint", 82: "waypoint", 22: "take-off", 84: "take-off", 24: "take-off", 21: "landing", 85: "landing"}
 _KINDS |= dict.fromkeys((17, 18, 19, 31), "loiter")
+_LAST_NAVIGATION, _REGION_OF_INTEREST = 95, 80
 _MSL_FRAMES, _HOME_FRAMES, _TERRAIN_FRAMES = (0, 5), (3, 6), (10, 11)
+_ALL_TYPES = 255
 
 
-@dataclass(frozen=True, slots=True)
-class Overheard:
-    """One message of a mission transfer: how many items are to come, or one of them."""
+def plan_point(
+    sequence: int, command: int, frame: int, latitude_deg: float, longitude_deg: float, altitude_m: float
+) -> PlanPoint | None:
+    """A mission item as a point of a plan; None where it is no place that the vehicle will pass.
+
+    `command` and `frame` are MAV_CMD and MAV_FRAME; the altitude is above what the frame says, NaN where it says none.
+    """
+    if command > _LAST_NAVIGATION or command == _REGION_OF_INTEREST or not _is_place(latitude_deg, longitude_deg):
+        return None
+    if frame not in (*_MSL_FRAMES, *_HOME_FRAMES, *_TERRAIN_FRAMES):
+        return None
+    altitude = altitude_m if math.isfinite(altitude_m) else None
+    return PlanPoint(
+        sequence,
+        _KINDS.get(command, "other"),
+        math.radians(latitude_deg),
+        math.radians(longitude_deg),
+        altitude_msl_m=altitude if frame in _MSL_FRAMES else None,
+        altitude_above_home_m=altitude if frame in _HOME_FRAMES else None,
+    )
+
+
+class Overheard(NamedTuple):
+    """One message of a mission transfer."""
 
     target_system: int
-    is_flight_plan: bool  # and no fence or rally points
-    count: int | None = None
-    sequence: int = 0
-    command: int = 0
-    frame: int = 0
-    place_deg: tuple[float, float] = (0.0, 0.0)
-    altitude_m: float = math.nan
+    act: str  # "count", "item", "acknowledge", "clear"; "" = about a fence, rally points or a guided target
+    number: int = 0  # of items, of the item, or what the acknowledgement says (0 = accepted)
+    point: PlanPoint | None = None
 
 
 def overheard(message: int, payload: bytes) -> Overheard:
     """What one of `MISSION_MESSAGES` says."""
     if message == MISSION_COUNT:
         count, target, mission = _read_count(payload)
-        return Overheard(target, mission == 0, count)
+        return Overheard(target, "" if mission else "count", count)
+    if message == MISSION_ACK:
+        result, target, mission = _read_ack(payload)
+        return Overheard(target, "" if mission else "acknowledge", result)
+    if message == MISSION_CLEAR_ALL:
+        target, mission = _read_clear(payload)
+        return Overheard(target, "" if mission not in (0, _ALL_TYPES) else "clear")
     read = _read_item_int if message == MISSION_ITEM_INT else _read_item
-    sequence, command, frame, x, y, altitude_m, target, mission = read(payload)
-    place_deg = (x / 1e7, y / 1e7) if message == MISSION_ITEM_INT else (x, y)
-    return Overheard(target, mission == 0, None, sequence, command, frame, place_deg, altitude_m)
+    sequence, command, frame, x, y, altitude_m, target, mission, current = read(payload)
+    if mission or current > 1:
+        return Overheard(target, "")
+    place = (x / 1e7, y / 1e7) if message == MISSION_ITEM_INT else (x, y)
+    return Overheard(target, "item", sequence, plan_point(sequence, command, frame, *place, altitude_m))
 
 
 @dataclass(slots=True)
 class PlanBook:
     """What is known of one vehicle's plan so far."""
 
+    next_item: int | None = None  # where it says that it goes
     _home: PlanPoint | None = None
     _points: dict[int, PlanPoint] = field(default_factory=dict)
     _heard: set[int] = field(default_factory=set)
     _expected: int | None = None
+    _before: dict[int, PlanPoint] | None = None  # what it had when a station began to send it another
+    _told: tuple[PlanPoint, ...] = ()
 
-    def hear(self, told: Overheard) -> bool:
+    def hear(self, told: Overheard, *, by_vehicle: bool, begins_with_home: bool = True) -> bool:
         """One message of a transfer; whether the plan has changed and is whole (as far as its length is known)."""
-        if told.count is not None:
-            self._expected = told.count
-            self._heard.clear()
-            return False
-        sequence = told.sequence
-        point = None if sequence == 0 else _point(told)  # 0 is a copy of home
-        known = self._points.get(sequence)
-        first = sequence not in self._heard
-        if point is None:
-            self._points.pop(sequence, None)
-        else:
-            self._points[sequence] = point
-        self._heard.add(sequence)
-        if self._expected is None:
-            return point is not None and point != known
-        whole = len(self._heard) >= self._expected
-        if whole and first:
-            for surplus in [number for number in self._points if number >= self._expected]:
-                del self._points[surplus]
-        return whole and (first or point != known)
+        if told.act == "item":
+            self._hear_item(told.number, None if told.number == 0 and begins_with_home else told.point)
+        elif told.act in ("count", "clear"):
+            self._begin(told.number, by_vehicle)
+        elif told.act == "acknowledge" and by_vehicle:
+            self._end(accepted=told.number == 0)
+        whole = self._expected is None or len(self._heard) >= self._expected
+        return whole and self._is_news()
 
     def hear_home(self, latitude_deg: float, longitude_deg: float, altitude_msl_m: float) -> bool:
         """The vehicle's home; whether the plan has changed."""
-        home = PlanPoint(
-            0, "home", math.radians(latitude_deg), math.radians(longitude_deg), altitude_msl_m=altitude_msl_m
-        )
-        if not _is_place(latitude_deg, longitude_deg) or home == self._home:
+        if not _is_place(latitude_deg, longitude_deg):
+            return False
+        place = (math.radians(latitude_deg), math.radians(longitude_deg))
+        home = PlanPoint(0, "home", *place, altitude_msl_m=altitude_msl_m)
+        if home == self._home:
             return False
         self._home = home
-        return True
+        return self._is_news()
 
     def points(self) -> tuple[PlanPoint, ...]:
         """The plan, home first, in the order of the sequence numbers."""
         home = () if self._home is None else (self._home,)
         return (*home, *(self._points[number] for number in sorted(self._points)))
 
+    def point(self, sequence: int) -> PlanPoint | None:
+        """The point of this item; None where it is not known or no point."""
+        return self._points.get(sequence)
+
+    def altitude_msl_m(self, point: PlanPoint) -> float | None:
+        """A point's altitude above mean sea level, by home's where it is told above home; None where that is not known."""
+        above = point.altitude_above_home_m
+        if above is None or self._home is None or self._home.altitude_msl_m is None:
+            return point.altitude_msl_m
+        return self._home.altitude_msl_m + above
+
+    def summary(self) -> str:
+        """The plan in a few words, for people."""
+        number = len(self._points)
+        if not number and self.next_item is None:
+            return "none known"
+        text = f"{number} point{'' if number == 1 else 's'}"
+        return text if self.next_item is None else f"{text}, next {self.next_item}"
+
+    def _hear_item(self, sequence: int, point: PlanPoint | None) -> None:
+        if point is None:
+            self._points.pop(sequence, None)
+        else:
+            self._points[sequence] = point
+        self._heard.add(sequence)
+        if self._expected is not None and len(self._heard) >= self._expected:
+            for surplus in [number for number in self._points if number >= self._expected]:
+                del self._points[surplus]
+
+    def _begin(self, count: int, by_vehicle: bool) -> None:
+        """A transfer of so many items begins; of none: the plan is empty."""
+        self._before = None if by_vehicle else dict(self._points)
+        self._expected = count
+        self._heard.clear()
+        if count == 0:
+            self._points.clear()
+            self.next_item = None
+
+    def _end(self, *, accepted: bool) -> None:
+        """The vehicle has taken what it was sent, or has not."""
+        if self._before is not None and not accepted:
+            self._points, self._expected = self._before, None
+        self._before = None
+
+    def _is_news(self) -> bool:
+        points = self.points()
+        if points == self._told:
+            return False
+        self._told = points
+        return True
+
 
 def _is_place(latitude_deg: float, longitude_deg: float) -> bool:
     inside = abs(latitude_deg) <= 90.0 and abs(longitude_deg) <= 180.0  # false for NaN too
     return inside and (latitude_deg != 0.0 or longitude_deg != 0.0)
-
-
-def _point(told: Overheard) -> PlanPoint | None:
-    if told.frame not in (*_MSL_FRAMES, *_HOME_FRAMES, *_TERRAIN_FRAMES) or not _is_place(*told.place_deg):
-        return None
-    altitude_m = told.altitude_m if math.isfinite(told.altitude_m) else None
-    return PlanPoint(
-        told.sequence,
-        _KINDS.get(told.command, "other"),
-        math.radians(told.place_deg[0]),
-        math.radians(told.place_deg[1]),
-        altitude_msl_m=altitude_m if told.frame in _MSL_FRAMES else None,
-        altitude_above_home_m=altitude_m if told.frame in _HOME_FRAMES else None,
-    )
