@@ -1,4 +1,4 @@
-"""Where pictures go: the archive's tables, the recording of the viewer, and the viewers that come to it."""
+"""Where pictures go: the archive's tables, the viewer's recording, the viewers that come to it, and who is told of tracks."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ import errno
 from pathlib import Path
 
 from gateway.picture import Picture
+from gateway.runtime.publisher import Publisher, open_publisher
 from gateway.runtime.setup import Serve
-from gateway.runtime.urls import LinkError
+from gateway.runtime.urls import LinkError, Url
 from gateway.settings import Site
 from gateway.sinks import Sink
 from gateway.sinks.arrow import ArrowSink
 from gateway.sinks.parquet import finish
+from gateway.sinks.publish import PublishSink
 from gateway.sinks.rerun import RerunSink
 
 RRD_FILE = "session.rrd"
@@ -23,13 +25,29 @@ _UNWATCHED = (30.0, 4096)  # where a recording is replayed as fast as it goes: f
 class Outputs:
     """The sinks of one session. `watched`: somebody looks on, or the session must survive a kill; small batches then.
 
-    Raises OSError when what must be kept could not be, LinkError when the viewers' port is taken.
+    Raises OSError when what must be kept could not be, LinkError when the viewers' port is taken or tracks cannot be
+    published where they should be.
     """
 
-    def __init__(self, site: Site, folder: Path | None, serve: Serve | None, *, watched: bool = True) -> None:
+    def __init__(
+        self,
+        site: Site,
+        folder: Path | None,
+        serve: Serve | None,
+        *,
+        watched: bool = True,
+        publish: Url | None = None,
+        publish_system: int = 1,
+    ) -> None:
         self._folder = folder
         self._sinks: list[Sink] = []
         self._rerun: RerunSink | None = None
+        self._publisher: Publisher | None = None
+        self._published: PublishSink | None = None
+        if publish is not None:
+            self._publisher = open_publisher(publish)
+            self._published = PublishSink(self._publisher.send, system=publish_system)
+            self._sinks.append(self._published)
         if folder is not None:
             separation_m = site.runway.geoid_separation_m or 0.0
             period_s = _TABLES_WATCHED_S if watched else _UNWATCHED[0]
@@ -47,6 +65,21 @@ class Outputs:
     def dropped(self) -> int:
         """Rows that viewers did not take in time; the archive has them."""
         return self._rerun.dropped if self._rerun else 0
+
+    @property
+    def publishes_on(self) -> str | None:
+        """The link that tracks are published on."""
+        return str(self._publisher.url) if self._publisher else None
+
+    def counters(self) -> dict[str, int]:
+        """What was published, totals by reason."""
+        if self._publisher is None or self._published is None:
+            return {}
+        return {**self._published.counters, **self._publisher.counters}
+
+    def is_our_own(self, frame: bytes) -> bool:
+        """Whether a frame that came in is one of those that we published, passed on by somebody."""
+        return self._published is not None and self._published.is_our_own(frame)
 
     def write(self, picture: Picture) -> None:
         """Hand one picture to every sink."""
@@ -67,6 +100,8 @@ class Outputs:
                 sink.close()
             except OSError as error:
                 failure = error
+        if self._publisher is not None:
+            self._publisher.close()
         if failure is not None:
             raise failure
 

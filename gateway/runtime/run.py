@@ -81,7 +81,14 @@ class Run:
         if self._recorder is not None:
             self._recorder.describe(site=place.text, site_origin=place.origin)
         try:
-            self.outputs = Outputs(place.site, self.folder, self.setup.serve, watched=self.setup.is_watched)
+            self.outputs = Outputs(
+                place.site,
+                self.folder,
+                self.setup.serve,
+                watched=self.setup.is_watched,
+                publish=self.setup.publish,
+                publish_system=self.setup.publish_system,
+            )
         except OSError as error:
             raise self._failure(error) from error
 
@@ -122,6 +129,10 @@ class Run:
         if self._first_at is None:
             self._first_at = arrival.received_at
         self._arrivals[arrival.source] += 1
+        if self.outputs is not None and self.outputs.is_our_own(arrival.data):
+            if self._recorder is not None:
+                self._recorder.refuse(arrival)
+            return None
         decoded = self._decoder.feed(arrival)
         if self._recorder is not None:
             if self._decoder.refused:
@@ -175,7 +186,8 @@ class Run:
 
     def _counters(self) -> dict[str, int]:
         gateway = self._tally.gateway_counters() if self._tally else {}
-        return {**self._link_counters, **self._decoder.counters(), **gateway}
+        outputs = self.outputs.counters() if self.outputs else {}
+        return {**self._link_counters, **self._decoder.counters(), **gateway, **outputs}
 
     def _failure(self, error: OSError) -> RunFailure:
         where = self.folder or error.filename or "the archive"

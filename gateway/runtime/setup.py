@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from gateway.runtime.urls import Url
 from gateway.settings import Options, Site
 
 
@@ -38,6 +39,8 @@ class Setup:
     options: Options = field(default_factory=Options)
     archive: Path | None = None
     serve: Serve | None = None  # None: no viewer can come
+    publish: Url | None = None  # where tracks are told as MAVLink; None: they are not
+    publish_system: int = 1  # the system, 1 to 255, whose ADS-B component we are there
     keys: Mapping[int, bytes] = field(default_factory=dict)  # a radar's number -> its key
     live: bool = False
     is_watched: bool = True  # False: drawn in large batches, for a replay as fast as it goes that nobody looks at
