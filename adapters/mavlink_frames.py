@@ -228,13 +228,18 @@ _RECENT = (1 << (_REORDERED + 1)) - 1
 
 
 def fields(name: str, *wanted: str) -> tuple[int, Callable[[bytes], tuple[Any, ...]]]:
-    """The id of a message and a function from its payload to the wanted fields (numbers, at least two), in that order."""
+    """The id of a message and a function from its payload to the wanted fields (at least two), in that order.
+
+    Fields are numbers, texts are bytes; of an array one element each: "covariance[7]".
+    """
     message = _MESSAGES[_NUMBERS[name]]
     kinds = dict(zip(message.fieldnames, message.fieldtypes, strict=True))
     place, places = 0, {}
     for field_name, repeats in zip(message.ordered_fieldnames, message.array_lengths, strict=True):
         places[field_name] = place
-        place += 1 if kinds[field_name] == "char" else max(repeats, 1)  # a text is one value, an array many
+        number = 1 if kinds[field_name] == "char" else max(repeats, 1)  # a text is one value, an array many
+        places |= {f"{field_name}[{index}]": place + index for index in range(number)}
+        place += number
     unpack, size = message.unpacker.unpack, message.unpacker.size
     pick = itemgetter(*(places[one] for one in wanted))
 
