@@ -18,6 +18,7 @@ from adapters.clock import SourceClock
 from adapters.fixes import Fixes
 from adapters.mavlink_frames import SequenceCheck
 from adapters.plans import PlanBook
+from gateway.observation import VehicleStatus
 
 INVALID_AUTOPILOT = 8
 # GCS, antenna tracker, onboard controller, gimbal, ADS-B, camera, charging station, FLARM, servo, ODID, battery,
@@ -43,6 +44,8 @@ class Vehicle:
     has_sim_state: bool = False
     fix_notes: int = 0
     had_fix: bool = False
+    status: VehicleStatus | None = None  # what its last heartbeat said
+    last_attitude: int = -1  # time since boot, ns
     readings: dict[str, float] = field(default_factory=dict)  # what it last said, for people: "airspeed, m/s": 21.3
     words: dict[str, str] = field(default_factory=dict)  # and in words: "landed": "on ground"
     recent: deque[tuple[int, int, int, bytes]] = field(default_factory=lambda: deque(maxlen=512))
