@@ -18,7 +18,6 @@ import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 from adapters.mavlink_frames import FrameEncoder
 from adapters.published import (
@@ -34,7 +33,7 @@ from adapters.published import (
 )
 from gateway.fuse import Fused
 from gateway.geodesy import ECCENTRICITY_2, SEMI_MAJOR_M, prime_vertical_radius_m
-from gateway.observation import GpsReport, Observation, RadarPlot
+from gateway.observation import Observation, RadarPlot
 from gateway.picture import Picture
 
 SYSTEM = 1
@@ -42,10 +41,7 @@ HEARTBEATS, REPORTS, OUR_OWN = "publish: heartbeats", "publish: traffic reports"
 _SECOND = 1_000_000_000
 _SPREAD = 0.6180339887498949  # the golden section: any number of tracks falls evenly over the second
 _ECHO_NS = 120 * _SECOND  # an autopilot keeps what it heard for up to a minute
-_CALLSIGN_NS = 600 * _SECOND
 _LATELY_NS = 10 * _SECOND
-_REMEMBERED = 4096  # aircraft; more are not told of anyhow, they are garbage
-_Value = TypeVar("_Value")
 
 
 @dataclass(slots=True)
@@ -68,9 +64,7 @@ class PublishSink:
         self._encoder = FrameEncoder(system, COMPONENT)
         self._tracks: dict[int, _Told] = {}
         self._heartbeat_due = 0
-        self._callsigns: dict[str, tuple[int, str]] = {}
-        self._pressures: dict[str, tuple[int, float]] = {}
-        self._simulated: dict[str, tuple[int, bool]] = {}
+        self._simulated: dict[str, int] = {}  # radar track -> when it last said so
         self._lately: dict[Key, int] = {}
         self.counters = Counter({HEARTBEATS: 0, REPORTS: 0})
 
@@ -104,15 +98,10 @@ class PublishSink:
         return True
 
     def _hear(self, observations: Sequence[Observation]) -> None:
-        """What reports say of an aircraft that the tracks do not carry."""
+        """Which radar tracks say of themselves that they are simulated."""
         for one in observations:
-            if isinstance(one, GpsReport):
-                if one.callsign:
-                    _remember(self._callsigns, one.aircraft, one.valid_at, one.callsign)
-                if one.pressure_altitude_m is not None:
-                    _remember(self._pressures, one.aircraft, one.valid_at, one.pressure_altitude_m)
-            elif isinstance(one, RadarPlot) and one.simulated:
-                _remember(self._simulated, f"{one.radar}/{one.track_number}", one.valid_at, True)
+            if isinstance(one, RadarPlot) and one.simulated:
+                self._simulated[f"{one.radar}/{one.track_number}"] = one.valid_at
 
     def _keep(self, fused: Fused, now: int) -> None:
         """The newest measured row of each track; tracks that ended go."""
@@ -153,51 +142,35 @@ class PublishSink:
         if altitude is not None and up is not None:
             altitude += up * missing_s
         aircraft, radar_track = fused.aircraft[row], fused.radar_track[row]
-        pressure = _recalled(self._pressures, aircraft, at, _LATELY_NS) if altitude is None else None
-        simulated = [_recalled(self._simulated, name, at, _LATELY_NS) for name in (radar_track or "").split()]
+        simulated = [at - self._simulated.get(name, 0) <= _LATELY_NS for name in (radar_track or "").split()]
         return Traffic(
             address=address_of(aircraft, track),
             latitude_rad=latitude,
             longitude_rad=longitude,
             age_s=age_s,
             altitude_msl_m=altitude,
-            pressure_altitude_m=pressure,
+            pressure_altitude_m=_known(float(fused.pressure_altitude_m[row])),
             velocity_east_mps=east,
             velocity_north_mps=north,
             velocity_up_mps=up,
-            callsign=self._callsign(aircraft, radar_track, at),
+            callsign=fused.callsign[row] or _name(aircraft, radar_track),
             emitter_type=TYPE_UAV if (aircraft or "").startswith("mavlink:") else TYPE_UNKNOWN,
             is_simulated=any(simulated),
         )
 
-    def _callsign(self, aircraft: str | None, radar_track: str | None, at: int) -> str:
-        """The aircraft's own callsign, else a name that people find again on their other screens; "" for none."""
-        if aircraft is None:
-            return "R" + radar_track.split()[0] if radar_track else ""
-        own = _recalled(self._callsigns, aircraft, at, _CALLSIGN_NS)
-        if own is not None:
-            return own
-        kind, _, name = aircraft.partition(":")
-        return "MAV" + name if kind == "mavlink" else "" if kind == "icao" else name
+
+def _name(aircraft: str | None, radar_track: str | None) -> str:
+    """What people find again on their other screens; "" where an address says as much."""
+    if aircraft is None:
+        return "R" + radar_track.split()[0] if radar_track else ""
+    kind, _, name = aircraft.partition(":")
+    return "MAV" + name if kind == "mavlink" else "" if kind == "icao" else name
 
 
 def address_of(aircraft: str | None, track: int) -> int:
     """The aircraft's own ICAO address, or one made up for its track. A second aircraft of one address has none."""
     own = re.fullmatch(r"icao:([0-9a-fA-F]{6})", aircraft or "")
     return int(own[1], 16) if own else made_up_address(track)
-
-
-def _remember(known: dict[str, tuple[int, _Value]], name: str, at: int, value: _Value) -> None:
-    known.pop(name, None)
-    known[name] = (at, value)
-    if len(known) > _REMEMBERED:
-        del known[next(iter(known))]
-
-
-def _recalled(known: dict[str, tuple[int, _Value]], name: str | None, at: int, for_ns: int) -> _Value | None:
-    """What is known under a name, if it is not older than this."""
-    when, value = known.get(name or "", (0, None))
-    return value if at - when <= for_ns else None
 
 
 def _next(due: int, now: int) -> int:
