@@ -1,8 +1,8 @@
-"""Links: where bytes come in. UDP, TCP client, serial; none of them blocks, none of them sends telemetry.
+"""Links: where bytes come in. UDP, TCP client, serial; none of them blocks, none of them sends unless it is told to.
 
 A link answers three questions: what it can be waited on by (`fileno`), what has come in (`receive`), and how it is
-doing (`counters`). The gateway is passive; the one thing that a link ever sends is the empty datagram of a `udpout`
-link, once a second until its peer answers: it carries no MAVLink, and without it the peer could not know where we are.
+doing (`counters`). The one thing that a link sends by itself is the empty datagram of a `udpout` link, once a second
+until its peer answers: it carries no MAVLink, and without it the peer could not know where we are.
 """
 
 from __future__ import annotations
@@ -12,28 +12,30 @@ import socket
 import struct
 import sys
 from collections import Counter
-from dataclasses import dataclass
-from typing import Protocol
+from itertools import repeat
+from typing import NamedTuple, Protocol
 
+from gateway.runtime.batches import SO_RXQ_OVFL, SO_TIMESTAMPNS, batches_of
 from gateway.runtime.urls import LinkError, Url, bracketed
 
 RECEIVE_BUFFER_BYTES = 4 << 20
 _LARGEST_DATAGRAM = 65_535
-_DATAGRAMS_A_TURN = 512  # then the other links have theirs
+_DATAGRAMS_A_TURN = 2048  # then the other links have theirs
 _LINUX = sys.platform == "linux"
-_SO_TIMESTAMPNS = 35 if _LINUX else None  # not in Python's socket module; the kernel's time of arrival
-_SO_RXQ_OVFL = 40 if _LINUX else None  # not in Python's socket module; datagrams that the kernel had to drop
+_SO_MEMINFO = 55  # not in Python's socket module; nine numbers, the last of which is what the kernel had to drop
 _ANCILLARY_BYTES = 128
 _HELLO_EVERY_NS = 1_000_000_000
 _SILENT_AFTER_NS = 5_000_000_000
+_ASK_DROPS_NS = 1_000_000_000
+_PEERS_REMEMBERED = 1024
 
 
-@dataclass(frozen=True, slots=True)
-class Chunk:
+class Chunk(NamedTuple):
     """Bytes that came in at once: a datagram, or a piece of a stream.
 
     `peer` tells senders of one link apart; `stream` numbers the connections of a byte stream (None: a datagram);
-    `kernel_utc_ns` is the kernel's time of arrival where the platform tells it.
+    `kernel_utc_ns` is the kernel's time of arrival where the platform tells it. A NamedTuple, because tens of thousands
+    a second are made.
     """
 
     peer: str
@@ -55,6 +57,12 @@ class Link(Protocol):
     def receive(self) -> list[Chunk]:
         """What has come in; never waits."""
 
+    def send(self, data: bytes, peer: str | None) -> bool:
+        """Send to a peer (the name that its chunks have; None: the link's only one); never waits.
+
+        What cannot be sent at once is dropped, counted as "not sent", and False.
+        """
+
     def tend(self, now_ns: int) -> None:
         """Do what is due: say hello, connect again."""
 
@@ -62,44 +70,53 @@ class Link(Protocol):
         """Let go of the port."""
 
 
-def open_link(url: Url) -> Link:
-    """The open link.
+def open_link(url: Url, receive_buffer_bytes: int | None = RECEIVE_BUFFER_BYTES) -> Link:
+    """The open link. The receive buffer is what a UDP link asks for; None leaves it as the system makes it.
 
     Raises LinkError: one sentence with what is in the way and what to do.
     """
     if url.scheme in ("udpin", "udpout"):
-        return UdpLink(url)
+        return UdpLink(url, receive_buffer_bytes)
     from gateway.runtime.streams import SerialLink, TcpLink
 
     return TcpLink(url) if url.scheme == "tcp" else SerialLink(url)
 
 
 def resolve(url: Url, kind: socket.SocketKind) -> tuple[socket.AddressFamily, tuple[str, int]]:
-    """The address family and address of a URL's host.
+    """The address family and address of a URL's host: the first of `addresses`."""
+    return addresses(url, kind)[0]
 
-    Raises LinkError when the host has no address.
+
+def addresses(url: Url, kind: socket.SocketKind) -> list[tuple[socket.AddressFamily, tuple[str, int]]]:
+    """Every address of a URL's host, IPv4 first: where a name has both, MAVLink programs listen there.
+
+    Raises LinkError when the host has none.
     """
     try:
-        family, _, _, _, address = socket.getaddrinfo(url.host, url.port, type=kind)[0]
+        found = socket.getaddrinfo(url.host, url.port, type=kind)
     except (socket.gaierror, UnicodeError) as error:
         raise LinkError(f"{url}: there is no host {url.host!r} to be found; write its address in numbers.") from error
-    return family, (str(address[0]), int(address[1]))
+    ordered = sorted(found, key=lambda one: one[0] != socket.AF_INET)
+    return [(family, (str(address[0]), int(address[1]))) for family, _, _, _, address in ordered]
 
 
 class UdpLink:
     """A UDP socket: listening (udpin), or calling on one peer (udpout)."""
 
-    def __init__(self, url: Url) -> None:
+    def __init__(self, url: Url, receive_buffer_bytes: int | None = RECEIVE_BUFFER_BYTES) -> None:
         self.url = url
         self.counters: Counter[str] = Counter()
         self.news: list[tuple[str, str]] = []
         self._dropped = 0
+        self._ask_drops_ns = 0
         self._hello_due_ns = 0
         self._heard = False
+        self._senders: dict[str, tuple[str, int]] = {}
         family, self._address = resolve(url, socket.SOCK_DGRAM)
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        self._batches = batches_of(self._socket)
         try:
-            self.granted_bytes = self._configure()
+            self.granted_bytes = self._configure(receive_buffer_bytes)
             if url.scheme == "udpin":
                 self._socket.bind(self._address)
                 host, port = self._socket.getsockname()[:2]
@@ -110,23 +127,23 @@ class UdpLink:
             self._socket.close()
             raise LinkError(_why_not(url, error)) from error
 
-    def _configure(self) -> int:
+    def _configure(self, wanted: int | None) -> int:
         """Ask for what helps, and read back what was granted: the receive buffer in bytes."""
         self._socket.setblocking(False)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+        if wanted is not None:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, wanted)
         granted = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
         if _LINUX:
             granted //= 2  # Linux tells twice what it gives, the other half is its own book-keeping
-        for option in (_SO_TIMESTAMPNS, _SO_RXQ_OVFL):
-            if option is not None:
+            for option in (SO_TIMESTAMPNS, SO_RXQ_OVFL):
                 try:
                     self._socket.setsockopt(socket.SOL_SOCKET, option, 1)
                 except OSError:
                     self.counters[f"no socket option {option}"] += 1
-        if granted < RECEIVE_BUFFER_BYTES:
+        if wanted is not None and granted < wanted:
             advice = ", raise net.core.rmem_max to change that" if _LINUX else ""
-            kib = granted >> 10
-            self.news.append(("info", f"{self.url}: receive buffer of {kib} KiB instead of 4096 KiB{advice}."))
+            text = f"{self.url}: receive buffer of {granted >> 10} KiB instead of {wanted >> 10} KiB{advice}."
+            self.news.append(("info", text))
         return granted
 
     def fileno(self) -> int | None:
@@ -137,40 +154,69 @@ class UdpLink:
     def receive(self) -> list[Chunk]:
         """The datagrams that wait, at most a turn's worth."""
         chunks: list[Chunk] = []
-        for _ in range(_DATAGRAMS_A_TURN):
-            try:
-                data, kernel_utc_ns, peer = self._one_datagram()
-            except (BlockingIOError, InterruptedError):
-                break
-            except OSError as error:  # "nobody there" in answer to a hello, or a network that went away
-                self.counters[f"socket error {errno.errorcode.get(error.errno or 0, 'unknown')}"] += 1
-                break
-            self._heard = True
-            chunks.append(Chunk(peer, data, None, kernel_utc_ns))
+        try:
+            while len(chunks) < _DATAGRAMS_A_TURN and self._take(chunks):
+                pass
+        except (BlockingIOError, InterruptedError):
+            pass
+        except OSError as error:  # "nobody there" in answer to what we sent, or a network that went away
+            self._failed(error)
+        self._heard = self._heard or bool(chunks)
         return chunks
 
-    def _one_datagram(self) -> tuple[bytes, int | None, str]:
+    def _take(self, chunks: list[Chunk]) -> bool:
+        """Add the next datagrams; whether there may be more. Raises OSError for what the socket has to report."""
+        if self._batches is None:
+            chunks.append(self._one_datagram())
+            return True
+        batch = self._batches.receive()
+        if batch is None:
+            return False
+        if batch.dropped is not None:
+            self._lost(batch.dropped)
+        chunks += map(Chunk, batch.peers, batch.contents, repeat(None), batch.kernel_utc_ns)
+        return batch.is_full
+
+    def _one_datagram(self) -> Chunk:
         if not _LINUX:
             data, address = self._socket.recvfrom(_LARGEST_DATAGRAM)
-            return data, None, _named(address)
+            return Chunk(_named(address), data, None, None)
         data, ancillary, _, address = self._socket.recvmsg(_LARGEST_DATAGRAM, _ANCILLARY_BYTES)
         kernel_utc_ns: int | None = None
         for level, kind, content in ancillary:
             if level != socket.SOL_SOCKET:
                 continue
-            if kind == _SO_TIMESTAMPNS and len(content) == 16:
+            if kind == SO_TIMESTAMPNS and len(content) == 16:
                 seconds, nanoseconds = struct.unpack("@qq", content)
                 kernel_utc_ns = seconds * 1_000_000_000 + nanoseconds
-            elif kind == _SO_RXQ_OVFL and len(content) == 4:
-                (dropped,) = struct.unpack("@I", content)
-                if not self._dropped:
-                    self.news.append(("error", f"{self.url}: datagrams were lost before we could read them (counted)."))
-                self.counters["dropped by the kernel"] += (dropped - self._dropped) % (1 << 32)
-                self._dropped = dropped
-        return data, kernel_utc_ns, _named(address) if address else str(self.url)
+            elif kind == SO_RXQ_OVFL and len(content) == 4:
+                self._lost(struct.unpack("@I", content)[0])
+        return Chunk(_named(address) if address else str(self.url), data, None, kernel_utc_ns)
+
+    def _lost(self, dropped: int) -> None:
+        """The kernel has dropped so many datagrams in all, modulo 2^32."""
+        more = (dropped - self._dropped) % (1 << 32)
+        if not 0 < more < 1 << 31:  # what a datagram says of drops is older than what the socket says when asked
+            return
+        if not self.counters["dropped by the kernel"]:
+            self.news.append(("error", f"{self.url}: datagrams were lost before we could read them (counted)."))
+        self.counters["dropped by the kernel"] += more
+        self._dropped = dropped
+
+    def _ask_drops(self) -> None:
+        """A datagram tells of the drops before it; of those after the last one only the socket itself can tell."""
+        try:
+            told = self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, 36)
+        except OSError:
+            return  # a kernel before 4.12
+        if len(told) == 36:
+            self._lost(struct.unpack("@9I", told)[8])
 
     def tend(self, now_ns: int) -> None:
-        """On a udpout link: an empty datagram a second until the peer answers, and again when it falls silent."""
+        """Ask for drops. On a udpout link: an empty datagram a second until the peer answers, and when it falls silent."""
+        if _LINUX and now_ns >= self._ask_drops_ns:
+            self._ask_drops()
+            self._ask_drops_ns = now_ns + _ASK_DROPS_NS
         if self.url.scheme != "udpout" or now_ns < self._hello_due_ns:
             return
         if not self._heard:
@@ -178,12 +224,42 @@ class UdpLink:
                 self._socket.send(b"")
                 self.counters["empty datagrams sent"] += 1
             except OSError as error:
-                self.counters[f"socket error {errno.errorcode.get(error.errno or 0, 'unknown')}"] += 1
+                self._failed(error)
         self._hello_due_ns = now_ns + (_SILENT_AFTER_NS if self._heard else _HELLO_EVERY_NS)
         self._heard = False
 
+    def send(self, data: bytes, peer: str | None) -> bool:
+        """Send a datagram: to a peer of a listening link, by the name of its chunks; a calling link has its own."""
+        try:
+            if self.url.scheme == "udpout":
+                self._socket.send(data)
+            elif peer is None:
+                raise BlockingIOError
+            else:
+                self._socket.sendto(data, self._address_of(peer))
+        except OSError as error:
+            self.counters["not sent"] += 1
+            if not isinstance(error, BlockingIOError):
+                self._failed(error)
+            return False
+        return True
+
+    def _address_of(self, peer: str) -> tuple[str, int]:
+        address = self._senders.get(peer)
+        if address is None:
+            if len(self._senders) >= _PEERS_REMEMBERED:
+                self._senders.clear()
+            host, _, port = peer.rpartition(":")
+            address = self._senders[peer] = (host.strip("[]"), int(port))
+        return address
+
+    def _failed(self, error: OSError) -> None:
+        self.counters[f"socket error {errno.errorcode.get(error.errno or 0, 'unknown')}"] += 1
+
     def close(self) -> None:
-        """Let go of the port."""
+        """Count the last drops, and let go of the port."""
+        if _LINUX and self.fileno() is not None:
+            self._ask_drops()
         self._socket.close()
 
 

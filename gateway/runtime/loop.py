@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from adapters import Arrival
 from gateway.picture import Picture
+from gateway.runtime.allowed import Allowed
 from gateway.runtime.links import Link
 from gateway.runtime.playback import Playback
 from gateway.runtime.receiver import Receiver
@@ -42,12 +43,15 @@ def run_live(
     watch: Watch = _nobody,
     asked_to_stop: AskedToStop = _never,
     no_place_after_s: float = _NO_PLACE_AFTER_S,
+    allowed: Allowed | None = None,
 ) -> Summary:
     """Fuse what open links bring until asked to stop, or for so many seconds; closes the links.
 
+    `allowed`: who may be heard; None: everybody.
+
     Raises RunFailure when the archive cannot be written, or the stream does not tell where we are.
     """
-    receiver = Receiver(mavlink, radar)
+    receiver = Receiver(mavlink, radar, allowed=allowed)
     try:
         run = Run(setup, receiver.started_at)
         with _Abandoning(run):

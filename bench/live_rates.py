@@ -1,0 +1,130 @@
+"""Live at high rates over UDP on loopback: what is lost, what is counted, what it costs.
+
+python -m bench.live_rates VEHICLES RATE SECONDS [default]      prints, as JSON, what one run gave
+
+The whole gateway runs in a process of its own: links, receiver, decoder, pipeline, archive (`run_live`, as `talkdown
+live` calls it, without its display). The telemetry comes from another process (see `bench.fleet`). With `default` the
+receive buffer is the one that the system gives to everybody.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bench.measure import Figure, environment, output
+
+if TYPE_CHECKING:
+    from gateway.picture import Picture
+    from gateway.runtime.run import Run
+
+FAST, FAST_VEHICLES = 50_000, 20
+FLEET, FLEET_VEHICLES = 10_000, 100
+_STARTS_S, _ENDS_S = 3.0, 2.0
+_SAMPLE_S = 2.0
+
+
+def live_rates(seconds: float) -> list[Figure]:
+    """50 000 messages/s into a large receive buffer, and 10 000/s of 100 vehicles into a default one."""
+    fast = _run(FAST_VEHICLES, FAST, int(seconds))
+    fleet = _run(FLEET_VEHICLES, FLEET, int(seconds), "default")
+    return [
+        *_figures(f"live, {FAST}/s, {fast['buffer_kib']} KiB", fast, lost=0.0, share=50.0),
+        *_figures(f"live, {FLEET}/s, {FLEET_VEHICLES} vehicles, {fleet['buffer_kib']} KiB", fleet, lost=0.1, share=None),
+    ]
+
+
+def _figures(name: str, told: dict[str, Any], lost: float, share: float | None) -> list[Figure]:
+    sent, recorded, counted = (float(told[one]) for one in ("sent", "recorded", "counted"))
+    return [
+        Figure(f"{name}: sent", "", (sent,)),
+        Figure("… recorded and decoded", "", (recorded,)),
+        Figure("… lost", "%", (100.0 * (sent - recorded) / sent,), lost),
+        Figure("… lost and not counted", "", (abs(sent - recorded - counted),), 0.0),
+        Figure("… share of a core", "%", tuple(told["shares"]), share),
+    ]
+
+
+def _run(vehicles: int, rate: int, seconds: int, *more: str) -> dict[str, Any]:
+    words = [str(vehicles), str(rate), str(seconds), *more]
+    told: dict[str, Any] = json.loads(output([sys.executable, "-m", "bench.live_rates", *words]))
+    return told
+
+
+class Meter:
+    """Watches a live run: the CPU time of this process, sampled; how many arrivals waited to be worked in at most."""
+
+    def __init__(self) -> None:
+        self.shares: list[float] = []
+        self.slowest_tick_s = 0.0
+        self._since = self._tick = time.monotonic()
+        self._used = time.process_time()
+
+    def __call__(self, run: Run, picture: Picture | None) -> None:
+        """After each step."""
+        now = time.monotonic()
+        self.slowest_tick_s = max(self.slowest_tick_s, now - self._tick)
+        self._tick = now
+        if now - self._since >= _SAMPLE_S:
+            used = time.process_time()
+            self.shares.append(100.0 * (used - self._used) / (now - self._since))
+            self._since, self._used = now, used
+
+
+def measure(vehicles: int, rate: int, seconds: int, *, default_buffer: bool = False) -> dict[str, Any]:
+    """One run: the gateway in here, the telemetry of another process."""
+    from gateway.runtime.links import RECEIVE_BUFFER_BYTES, UdpLink
+    from gateway.runtime.loop import run_live
+    from gateway.runtime.setup import Place, Setup
+    from gateway.runtime.urls import Url
+    from gateway.settings import DEMO_SITE, format_site
+
+    link = UdpLink(Url("udpin", "127.0.0.1", 0), None if default_buffer else RECEIVE_BUFFER_BYTES)
+    meter = Meter()
+    place = Place(DEMO_SITE, format_site(DEMO_SITE), "demo site")
+    command = [sys.executable, "-m", "bench.fleet", *map(str, (link.url.port, vehicles, rate, seconds))]
+    with tempfile.TemporaryDirectory() as folder:
+        setup = Setup(place=place, archive=Path(folder), live=True)
+        with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment()) as sender:
+            summary = run_live([link], [], setup, watch=meter, asked_to_stop=_Ended(sender))
+            sent = json.loads(sender.stdout.read()) if sender.stdout else {}
+    dropped = sum(count for reason, count in summary.counters.items() if "dropped by the kernel" in reason)
+    overflow = summary.counters.get("queue overflow", 0)
+    return {
+        "sent": sent["sent"],
+        "latest_beat_s": sent["latest_beat_s"],
+        "recorded": sum(int(source["arrivals"]) for source in summary.sources),
+        "dropped by the kernel": dropped,
+        "queue overflow": overflow,
+        "counted": dropped + overflow,
+        "track_rows": summary.track_rows,
+        "shares": meter.shares[1:],
+        "share": statistics.median(meter.shares[1:] or [0.0]),
+        "slowest_tick_s": meter.slowest_tick_s,
+        "buffer_kib": link.granted_bytes >> 10,
+        "counters": summary.counters,
+    }
+
+
+class _Ended:
+    """Asks for the end a moment after the sender has ended."""
+
+    def __init__(self, sender: subprocess.Popen[bytes]) -> None:
+        self._sender = sender
+        self._ended: float | None = None
+
+    def __call__(self) -> str | None:
+        if self._ended is None and self._sender.poll() is not None:
+            self._ended = time.monotonic()
+        return "the bench" if self._ended is not None and time.monotonic() - self._ended > _ENDS_S else None
+
+
+if __name__ == "__main__":
+    _vehicles, _rate, _seconds = (int(word) for word in sys.argv[1:4])
+    print(json.dumps(measure(_vehicles, _rate, _seconds, default_buffer="default" in sys.argv[4:])))
