@@ -23,15 +23,33 @@ from gateway.settings import RadarSite, Site
 Floats = NDArray[np.float64]
 Polar = tuple[float, float, float]  # range m, azimuth rad, elevation rad; NaN = not measured
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 SECOND = 1_000_000_000
 LEAST_POSITION_SIGMA_M = 0.3  # a receiver that claims less is describing its noise, not its error
 LEAST_VELOCITY_SIGMA_MPS = 0.1
+UNKNOWN_SPEED_MPS = 100.0  # what a coarse time is worth in metres when the stream does not say how fast it flies
+# How far a height guessed from a pressure altitude may be off: 1013 for the day's pressure (30 hPa are 250 m), and warm
+# or cold air. Without one the guess is the runway's height, and an airliner may be as high as airliners are.
+PRESSURE_SIGMA_M, PRESSURE_SIGMA_SHARE = 300.0, 0.05
+NO_HEIGHT_SIGMA_M = 5000.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Local:
+    """Of a report that lacks a component: the axes at the reported point, along which the others are measured."""
+
+    from_enu: Floats  # (3, 3) east, north, up there, of the runway's ENU
+    velocity_mps: Floats  # (3,) along these, NaN = not measured
+    has_height: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fix:
-    """A GPS report in the runway's ENU. Ordered by (at, aircraft, serial)."""
+    """A GPS report in the runway's ENU. Ordered by (at, aircraft, serial).
+
+    Without a height it stands at a guessed one, whose sigma is the last of `sigma_m`; nothing may take it for measured.
+    """
 
     at: int
     serial: int
@@ -42,6 +60,14 @@ class Fix:
     velocity_mps: Floats  # (3,) in the runway's ENU, NaN = not measured
     velocity_sigma_mps: float
     comparable: bool  # its clock allows to compare it with other sources
+    local: Local | None = None  # None: nothing, or all of the velocity, is missing
+    pressure_altitude_m: float = math.nan  # carried along, never measured against
+    callsign: str | None = None
+
+    @property
+    def has_height(self) -> bool:
+        """Whether its height is measured."""
+        return self.local is None or self.local.has_height
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,6 +90,7 @@ class Aligned:
     report_aircraft: tuple[str, ...]
     report_time: Ints  # (n,) ns
     report_runway_m: Floats  # (n, 3)
+    report_has_height: Bools  # (n,); without one the third coordinate is a guess
     plot_radar_track: tuple[str, ...]  # "1/3"; "1/0" is a plot that the radar does not track
     plot_time: Ints  # (m,) ns
     plot_runway_m: Floats  # (m, 3)
@@ -97,7 +124,7 @@ class Geoid:
         return Geoid(self.site_m, (*self.seen_m, report.height_m - report.altitude_msl_m))
 
     def height_m(self, report: GpsReport) -> float:
-        """Height above the ellipsoid of a report; the site's separation wins over the stream's own height."""
+        """Height above the ellipsoid of a report, NaN where it gives none; the site's separation wins over the stream's."""
         if report.altitude_msl_m is not None and (self.site_m is not None or report.height_m is None):
             return report.altitude_msl_m + self.separation_m
         return report.height_m if report.height_m is not None else math.nan
@@ -114,7 +141,12 @@ def place_reports(
         return []
     latitude = np.array([report.latitude_rad for report in reports])
     longitude = np.array([report.longitude_rad for report in reports])
-    ecef = geodetic_to_ecef(latitude, longitude, np.array(heights_m))
+    height = np.array(heights_m)
+    has_height = ~np.isnan(height)
+    guesses = {row: _guessed(report, site) for row, report in enumerate(reports) if not has_height[row]}
+    for row, (guess, _) in guesses.items():
+        height[row] = guess
+    ecef = geodetic_to_ecef(latitude, longitude, height)
     enu = turn(frame.enu_from_ecef, ecef - frame.origin_ecef_m)
     nan = math.nan
     local = np.array(
@@ -127,12 +159,20 @@ def place_reports(
             for report in reports
         ]
     )
-    # A component alone cannot be turned into the runway's axes; such a velocity counts as not measured.
-    velocity = (frame.local_from_enu(latitude, longitude).transpose(0, 2, 1) @ local[:, :, None])[:, :, 0]
+    # A component alone cannot be turned into the runway's axes: then what there is stays in the local ones.
+    axes = frame.local_from_enu(latitude, longitude)
+    velocity = (axes.transpose(0, 2, 1) @ local[:, :, None])[:, :, 0]
+    missing = np.isnan(local).sum(axis=1)
+    in_part = ~has_height | ((missing > 0) & (missing < 3))
     fixes = []
     for row, report in enumerate(reports):
         level = report.horizontal_sigma_m or site.position.sigma_m
         upright = report.vertical_sigma_m or report.horizontal_sigma_m or site.position.sigma_m
+        if report.timing_sigma_s:
+            level = math.hypot(level, _speed_mps(report) * report.timing_sigma_s)
+            upright = math.hypot(upright, (report.velocity_up_mps or 0.0) * report.timing_sigma_s)
+        if row in guesses:
+            upright = guesses[row][1]
         sigma = np.maximum(np.array([level, level, upright]), LEAST_POSITION_SIGMA_M)
         speed = max(report.velocity_sigma_mps or site.position.velocity_sigma_mps, LEAST_VELOCITY_SIGMA_MPS)
         comparable = report.timing in (Timing.UTC, Timing.ENVELOPE)
@@ -147,9 +187,27 @@ def place_reports(
                 velocity[row],
                 speed,
                 comparable,
+                Local(axes[row], local[row], bool(has_height[row])) if in_part[row] else None,
+                nan if report.pressure_altitude_m is None else report.pressure_altitude_m,
+                report.callsign,
             )
         )
     return fixes
+
+
+def _guessed(report: GpsReport, site: Site) -> tuple[float, float]:
+    """Where to put a report without a height, m above the ellipsoid, and the sigma of that guess."""
+    if report.pressure_altitude_m is None:
+        return site.runway.height_m, NO_HEIGHT_SIGMA_M
+    height_m = report.pressure_altitude_m + (site.runway.geoid_separation_m or 0.0)
+    return height_m, PRESSURE_SIGMA_M + PRESSURE_SIGMA_SHARE * abs(report.pressure_altitude_m)
+
+
+def _speed_mps(report: GpsReport) -> float:
+    """Over ground; a usual one where it is not measured."""
+    if report.velocity_east_mps is None or report.velocity_north_mps is None:
+        return UNKNOWN_SPEED_MPS
+    return math.hypot(report.velocity_east_mps, report.velocity_north_mps)
 
 
 def place_plot(plot: RadarPlot, serial: int, radar: RadarSite, correction: Floats) -> Plot:
@@ -249,6 +307,7 @@ def draw(fixes: Sequence[Fix], plots: Sequence[Plot], frame: RunwayFrame, radars
         report_aircraft=tuple(fix.aircraft for fix in fixes),
         report_time=np.array([fix.at for fix in fixes], dtype=np.int64),
         report_runway_m=turn(frame.runway_from_enu, report_m),
+        report_has_height=np.array([fix.has_height for fix in fixes], dtype=np.bool_),
         plot_radar_track=tuple(f"{plot.radar}/{plot.number}" for plot in plots),
         plot_time=np.array([plot.at for plot in plots], dtype=np.int64),
         plot_runway_m=plot_m,

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from gateway.align import SECOND
 from gateway.estimators.kalman import POSITION, Estimate, predict
 from gateway.frames import RunwayFrame, turn
-from gateway.fuse import Lane
+from gateway.fuse import Lane, knows_height
 from gateway.fuse.weighting import Model
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +33,7 @@ class Predicted:
     horizon_s: Floats
     latitude_rad: Floats
     longitude_rad: Floats
-    height_m: Floats
+    height_m: Floats  # NaN where the track's height is not known
     sigma_m: Floats  # horizontal, 1 sigma an axis
     method: tuple[str, ...]  # "two segments", "model"
     intent: tuple[str | None, ...]
@@ -50,21 +51,24 @@ class Forecast:
     horizons_s: tuple[float, ...]
     mean: Floats  # (t, h, 3) ENU
     sigma_m: Floats  # (t, h)
+    has_height: Bools  # (t,)
 
 
 def forecast(lanes: Sequence[Lane], at: int, horizons_s: tuple[float, ...], model: Model) -> Forecast:
     """Every track carried on from an instant to each horizon."""
     n, h = len(lanes), len(horizons_s)
+    covariance = np.array([lane.last.covariance for lane in lanes]).reshape(n, 9, 9)
+    has_height = knows_height([lane.last for lane in lanes], [at] * n, covariance)
     state = Estimate(
         np.repeat(np.array([lane.last.mean for lane in lanes]).reshape(n, -1), h, axis=0),
-        np.repeat(np.array([lane.last.covariance for lane in lanes]).reshape(n, 9, 9), h, axis=0),
+        np.repeat(covariance, h, axis=0),
     )
     since_s = np.array([max(at - lane.last.at, 0) / SECOND for lane in lanes])
     ahead = predict(state, (since_s[:, None] + np.array(horizons_s)).reshape(-1), model.motion)
     variance = 0.5 * (ahead.covariance[:, 0, 0] + ahead.covariance[:, 1, 1])
     tracks = tuple(lane.track for lane in lanes)
     mean = ahead.mean[:, POSITION].reshape(n, h, 3)
-    return Forecast(at, tracks, horizons_s, mean, np.sqrt(variance).reshape(n, h))
+    return Forecast(at, tracks, horizons_s, mean, np.sqrt(variance).reshape(n, h), has_height)
 
 
 def table(forecasts: Sequence[Forecast], frame: RunwayFrame) -> Predicted:
@@ -74,6 +78,8 @@ def table(forecasts: Sequence[Forecast], frame: RunwayFrame) -> Predicted:
     horizon = [np.tile(np.array(f.horizons_s), len(f.tracks)) for f in forecasts]
     position = np.concatenate([np.zeros((0, 3)), *(f.mean.reshape(-1, 3) for f in forecasts)])
     latitude, longitude, height = frame.geodetic_from_enu(position)
+    known = [np.repeat(f.has_height, len(f.horizons_s)) for f in forecasts]
+    height = np.where(np.concatenate([np.zeros(0, dtype=np.bool_), *known]), height, math.nan)
     made_at = np.concatenate([np.zeros(0, dtype=np.int64), *made])
     horizon_s = np.concatenate([np.zeros(0), *horizon])
     n = len(made_at)

@@ -120,7 +120,8 @@ class Work:
                     self._settle()  # what waits is written with the geoid that was known when it was heard
                 self.geoid = geoid
                 self.fixes.append(fix)
-                self._judge_heights()
+                if fix.has_height:
+                    self._judge_heights()
                 if observation.timing is not Timing.FOREIGN and self._is_timely(fix.at, fix.aircraft):
                     fixes.append(fix)
             elif isinstance(observation, RadarPlot):

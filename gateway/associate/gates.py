@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from gateway.align import SECOND, Fix, Polar, bracket
 from gateway.frames import RadarFrame, RunwayFrame, polar_from_xyz
@@ -12,6 +14,7 @@ from gateway.settings import Options, Site
 from gateway.track import GREATEST_SPEED_MPS, Key, Place, RadarTracks
 
 GATE_SIGMAS = 3.0
+IMPOSSIBLE_SIGMAS = 4.0  # a guessed height can forbid a pair beyond this, never support one
 SILENT_S = 3.0  # a radar track without plots for this long gives its aircraft free
 NOWHERE: Polar = (math.nan, math.nan, math.nan)
 
@@ -57,7 +60,7 @@ def compare(fix: Fix, tracks: RadarTracks, setting: Setting) -> tuple[tuple[Comp
         there, spread = seen[key[0]]
         if not _is_far(fix.at, there, spread, tracks.places[key]):
             value, sigma = bracket(plots, fix.at, setting.options.association_wait_s)
-            found.append(judge(key, value, sigma, there, spread, setting.options.association))
+            found.append(_judged(key, value, sigma, fix, there, spread, setting.options.association))
     return tuple(found), frozenset(alive)
 
 
@@ -67,7 +70,25 @@ def _seen_from(fix: Fix, radar: RadarFrame, setting: Setting) -> tuple[Polar, Po
     sigma_m = math.hypot(float(fix.sigma_m[0]), setting.site.position.systematic_m)
     upright_m = math.hypot(float(fix.sigma_m[2]), setting.site.position.systematic_m)
     level = max(distance * math.cos(elevation), 1.0)
-    return (distance, azimuth, elevation), (sigma_m, sigma_m / level, upright_m / max(distance, 1.0))
+    there, spread = (distance, azimuth, elevation), (sigma_m, sigma_m / level, upright_m / max(distance, 1.0))
+    if fix.local is None or fix.local.has_height:
+        return there, spread
+    above = fix.local.from_enu[2] * fix.sigma_m[2]
+    ends = polar_from_xyz(radar.from_enu(np.array([fix.enu_m - above, fix.enu_m + above]))).tolist()
+    # What a wrong guess of the height does is not linear where the line of sight is steep: the worse end of it counts.
+    ranges = max(abs(end[0] - distance) for end in ends)
+    azimuths = max(abs(math.remainder(end[1] - azimuth, 2.0 * math.pi)) for end in ends)
+    elevations = max(abs(end[2] - elevation) for end in ends)
+    return there, (math.hypot(spread[0], ranges), math.hypot(spread[1], azimuths), math.hypot(spread[2], elevations))
+
+
+def _judged(key: Key, value: Polar, sigma: Polar, fix: Fix, there: Polar, spread: Polar, rule: str) -> Comparison:
+    """`judge`; a height that is only guessed is not compared, but where it cannot be so far wrong the pair is none."""
+    if fix.has_height:
+        return judge(key, value, sigma, there, spread, rule)
+    found = judge(key, value, sigma, (there[0], there[1], math.nan), spread, rule)
+    far_off = abs(value[2] - there[2]) > IMPOSSIBLE_SIGMAS * math.hypot(sigma[2], spread[2])
+    return replace(found, hit=False) if far_off and found.hit else found
 
 
 def _is_far(at: int, there: Polar, spread: Polar, place: Place) -> bool:

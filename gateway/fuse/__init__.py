@@ -7,7 +7,7 @@ radar; `rows` makes the result.
 
 from gateway.fuse.lanes import Ended, Lane, Lanes, contains, emptied, end_silent, joined
 from gateway.fuse.placing import Scene, lane_of, reroute, take_fix, take_plot
-from gateway.fuse.rows import Fused, Row, coast, table, work
+from gateway.fuse.rows import Fused, Row, coast, knows_height, table, work
 
 __all__ = [
     "Ended",
@@ -21,6 +21,7 @@ __all__ = [
     "emptied",
     "end_silent",
     "joined",
+    "knows_height",
     "lane_of",
     "reroute",
     "table",

@@ -15,6 +15,8 @@ from gateway.fuse.weighting import (
     Model,
     start_from_fixes,
     start_from_plots,
+    start_in_part,
+    update_in_part,
     update_literally,
     update_with_fixes,
     update_with_plots,
@@ -40,6 +42,9 @@ class Event:
     radar_at: int
     interval: int  # ns, the longest of the last few between measurements
     outlying: bool
+    height_at: int  # when the vertical was last measured
+    barometric: Fix | None  # the last report with a pressure altitude
+    callsign: str | None
 
     @property
     def at(self) -> int:
@@ -89,7 +94,7 @@ def _advance(
         if base is None:
             events[row] = _event(measure, _start(measure, model), 0, np.full((model.memory, 3), math.nan), None, False)
             continue
-        near = neighbours[row](measure) if literal and isinstance(measure, Fix) else None
+        near = neighbours[row](measure) if literal and isinstance(measure, Fix) and measure.has_height else None
         groups.setdefault(_group(measure, near), []).append((row, base, measure, near))
     for (kind, radar), members in groups.items():
         rows, before, chosen, seen = zip(*members, strict=True)
@@ -112,7 +117,9 @@ def _group(measure: Measure, near: Near | None) -> tuple[str, int]:
     """Which measurements can be worked in together."""
     if isinstance(measure, Plot):
         return "plot", measure.radar
-    return ("literal", near[0]) if near is not None else ("fix", 0)
+    if near is not None:
+        return "literal", near[0]
+    return ("fix", 0) if measure.local is None else ("in part", 0)
 
 
 def _update(
@@ -137,8 +144,12 @@ def _update(
         polar, spread = np.array([one[1] for one in seen]), np.array([one[2] for one in seen])
         after, told = update_literally(state, position, sigma, polar, spread, model.radars[radar])
         return after, told.outlying, memory
-    velocity = _stacked([fix.velocity_mps for fix in fixes])
     speed_sigma = np.array([fix.velocity_sigma_mps for fix in fixes])
+    if kind == "in part":
+        parts = [fix.local for fix in fixes if fix.local is not None]
+        after, told, memory = update_in_part(state, position, sigma, parts, speed_sigma, memory, model)
+        return after, told.outlying, memory
+    velocity = _stacked([fix.velocity_mps for fix in fixes])
     after, told, memory = update_with_fixes(state, position, sigma, velocity, speed_sigma, memory, model)
     return after, told.outlying, memory
 
@@ -146,15 +157,27 @@ def _update(
 def _start(measure: Measure, model: Model) -> Estimate:
     if isinstance(measure, Plot):
         return start_from_plots(np.array([measure.polar]), np.array([measure.sigma]), measure.radar, model)
-    velocity = measure.velocity_mps[None]
     sigma = np.array([measure.velocity_sigma_mps])
-    return start_from_fixes(measure.enu_m[None], measure.sigma_m[None], velocity, sigma, model)
+    if measure.local is not None:
+        return start_in_part(measure.enu_m[None], measure.sigma_m[None], measure.local, sigma, model)
+    return start_from_fixes(measure.enu_m[None], measure.sigma_m[None], measure.velocity_mps[None], sigma, model)
 
 
 def _event(measure: Measure, after: Estimate, row: int, memory: Floats, base: Event | None, outlying: bool) -> Event:
-    is_fix = isinstance(measure, Fix)
-    gps_at = measure.at if is_fix else (base.gps_at if base else NEVER)
-    radar_at = (base.radar_at if base else NEVER) if is_fix else measure.at
+    gps_at, radar_at, height_at = (base.gps_at, base.radar_at, base.height_at) if base else (NEVER, NEVER, NEVER)
+    barometric, callsign = (base.barometric, base.callsign) if base else (None, None)
+    if isinstance(measure, Fix):
+        gps_at, has_height = measure.at, measure.has_height
+        callsign = measure.callsign or callsign
+        if measure.pressure_altitude_m == measure.pressure_altitude_m:
+            barometric = measure
+    else:
+        radar_at, has_height = measure.at, measure.polar[2] == measure.polar[2]
+    if has_height:
+        height_at = measure.at
     # The longest recent interval, forgotten slowly: tells a source of one report each 5 s from one that fell silent.
     interval = max(measure.at - base.at, base.interval - base.interval // 8) if base else 0
-    return Event(measure, after.mean[row], after.covariance[row], memory, gps_at, radar_at, interval, outlying)
+    mean, covariance = after.mean[row], after.covariance[row]
+    return Event(
+        measure, mean, covariance, memory, gps_at, radar_at, interval, outlying, height_at, barometric, callsign
+    )

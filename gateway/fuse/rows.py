@@ -13,7 +13,7 @@ from gateway.align import SECOND, Fix
 from gateway.associate import Span
 from gateway.estimators.kalman import ERROR, POSITION, SIZE, VELOCITY, Estimate, predict
 from gateway.frames import RunwayFrame, turn
-from gateway.fuse.filtering import Event, Job, run
+from gateway.fuse.filtering import NEVER, Event, Job, run
 from gateway.fuse.lanes import Ended, Lane, Lanes, radar_names
 from gateway.fuse.weighting import Model
 
@@ -21,6 +21,10 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 SEEN_WITHIN_S = 10.0  # a source that saw the track this lately is part of its state
+TOLD_WITHIN_S = 10.0  # a pressure altitude older than this is not written any more
+HEIGHT_WITHIN_S = 30.0  # a height that was measured this lately is known
+HEIGHT_SIGMA_M = 150.0  # and an older one as long as it is this sure
+CLIMB_SIGMA_MPS = 20.0  # without a height, a climb less sure than this is not known either
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,13 +40,15 @@ class Fused:
     state: tuple[str, ...]  # "gps only", "radar only", "fused", "coasting"
     latitude_rad: Floats
     longitude_rad: Floats
-    height_m: Floats  # above the ellipsoid
+    height_m: Floats  # above the ellipsoid; NaN = never measured, or too long ago
     altitude_msl_m: Floats
-    velocity_mps: Floats  # (n, 3) east, north, up at that point
+    velocity_mps: Floats  # (n, 3) east, north, up at that point; up is NaN where neither height nor climb is known
     covariance: Floats  # (n, 36) row-major over east, north, up position and velocity at that point
     modes: Floats  # (n, 3) straight, left, right; NaN = the estimator has none
-    runway_m: Floats  # (n, 3) position in the runway frame
+    runway_m: Floats  # (n, 3) position in the runway frame, at a guessed height where none is known
     bias_m: Floats  # (n, 3) estimated error of the position source, east north up; NaN = none
+    pressure_altitude_m: Floats  # as last reported; NaN = not in the last seconds
+    callsign: tuple[str | None, ...]
     ended: tuple[Ended, ...] = ()
 
 
@@ -60,6 +66,7 @@ class Row:
     mean: Floats  # (9,)
     covariance: Floats  # (9, 9)
     separation_m: float  # of the geoid, as it was known then
+    event: Event  # what the row was made of
 
 
 def row_of(lane: Lane, event: Event, spans: Sequence[Span], separation_m: float) -> Row:
@@ -71,7 +78,17 @@ def row_of(lane: Lane, event: Event, spans: Sequence[Span], separation_m: float)
     names = radar_names(lane, spans, event.at)
     received = event.measure.received_at
     return Row(
-        event.at, received, lane.track, lane.aircraft, names, by, state, event.mean, event.covariance, separation_m
+        event.at,
+        received,
+        lane.track,
+        lane.aircraft,
+        names,
+        by,
+        state,
+        event.mean,
+        event.covariance,
+        separation_m,
+        event,
     )
 
 
@@ -110,9 +127,24 @@ def coast(lanes: Sequence[Lane], at: int, spans: Sequence[Span], separation_m: f
             state.mean[i],
             state.covariance[i],
             separation_m,
+            lane.last,
         )
         for i, lane in enumerate(lanes)
     ]
+
+
+def knows_height(events: Sequence[Event], times: Sequence[int], covariance: Floats) -> NDArray[np.bool_]:
+    """Whether the height of each state is known at its time, (n,): measured lately, or still sure; (n, 9, 9)."""
+    measured = np.array([event.height_at for event in events], dtype=np.int64)
+    lately = np.array(times, dtype=np.int64) - measured <= int(HEIGHT_WITHIN_S * SECOND)
+    return np.asarray((measured != NEVER) & (lately | (covariance[:, 2, 2] <= HEIGHT_SIGMA_M**2)), dtype=np.bool_)
+
+
+def _pressure_altitude_m(row: Row) -> float:
+    told = row.event.barometric
+    if told is None or row.time - told.at > int(TOLD_WITHIN_S * SECOND):
+        return math.nan
+    return told.pressure_altitude_m
 
 
 def table(rows: Sequence[Row], ended: Sequence[Ended], frame: RunwayFrame, model: Model) -> Fused:
@@ -127,6 +159,9 @@ def table(rows: Sequence[Row], ended: Sequence[Ended], frame: RunwayFrame, model
     both[:, :3, :3] = both[:, 3:, 3:] = local
     covariance = both @ np.ascontiguousarray(full[:, :6, :6]) @ both.transpose(0, 2, 1)
     velocity = (local @ mean[:, VELOCITY][:, :, None])[:, :, 0]
+    has_height = knows_height([row.event for row in rows], [row.time for row in rows], full)
+    height = np.where(has_height, height, math.nan)
+    velocity[~has_height & (covariance[:, 5, 5] > CLIMB_SIGMA_MPS**2), 2] = math.nan
     known = np.array([row.aircraft is not None for row in rows], dtype=np.bool_)[:, None]
     has_error = model.motion.error_sigma_m > 0.0
     return Fused(
@@ -146,5 +181,7 @@ def table(rows: Sequence[Row], ended: Sequence[Ended], frame: RunwayFrame, model
         modes=np.full((n, 3), math.nan),
         runway_m=turn(frame.runway_from_enu, position),
         bias_m=np.where(known & has_error, mean[:, ERROR], math.nan),
+        pressure_altitude_m=np.array([_pressure_altitude_m(row) for row in rows]).reshape(n),
+        callsign=tuple(row.event.callsign for row in rows),
         ended=tuple(ended),
     )

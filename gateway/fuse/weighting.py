@@ -9,12 +9,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.align import Local
 from gateway.estimators.kalman import ERROR, POSITION, SIZE, VELOCITY, Estimate, Innovation, Motion, start, update
 from gateway.frames import RadarFrame, polar_from_xyz, polar_jacobian, xyz_from_polar
 from gateway.settings import Options, PositionSource, Weighting
@@ -74,6 +75,23 @@ def start_from_fixes(
     return state
 
 
+def start_in_part(position: Floats, sigma: Floats, local: Local, velocity_sigma: Floats, model: Model) -> Estimate:
+    """The first state from a report that lacks components: position and sigma (1, 3), sigma of the velocity (1,).
+
+    What is missing of the velocity is unknown; a height that is only guessed says nothing of the source's error.
+    """
+    axes, error = local.from_enu, model.motion.error_sigma_m
+    unknown = np.isnan(local.velocity_mps)
+    velocity = axes.T @ np.where(unknown, 0.0, local.velocity_mps)
+    speed_sigma = np.where(unknown, START_SPEED_SIGMA_MPS, velocity_sigma)
+    wrong = axes.T @ np.diag([error * error, error * error, error * error * local.has_height]) @ axes
+    covariance = axes.T @ np.diag(sigma[0] * sigma[0]) @ axes + wrong
+    state = start(position, covariance[None], velocity[None], velocity_sigma, error)
+    state.covariance[:, VELOCITY, VELOCITY] = axes.T @ np.diag(speed_sigma * speed_sigma) @ axes
+    state.covariance[:, POSITION, ERROR] = state.covariance[:, ERROR, POSITION] = -wrong
+    return state
+
+
 def start_from_plots(polar: Floats, sigma: Floats, radar: int, model: Model) -> Estimate:
     """First states from complete plots of one radar: range m, azimuth rad, elevation rad and sigmas, (n, 3)."""
     frame = model.radars[radar]
@@ -96,14 +114,28 @@ def update_with_fixes(
     model: Model,
 ) -> tuple[Estimate, Innovation, Floats]:
     """States after GPS reports; arrays as in `start_from_fixes`; memory (n, w, 3) of past position innovations."""
-    n = len(position)
-    has_error = bool(model.motion.error_sigma_m)
-    sensitivity = _FIX_WITH_ERROR if has_error else _FIX
-    expected = state.mean[:, POSITION]
-    if has_error:
-        expected = expected + state.mean[:, ERROR]
-    innovation = np.concatenate([position - expected, velocity - state.mean[:, VELOCITY]], axis=1)
-    speed_variance = np.broadcast_to((velocity_sigma * velocity_sigma)[:, None], (n, 3))
+    sensitivity = _FIX_WITH_ERROR if model.motion.error_sigma_m else _FIX
+    innovation = np.concatenate([position - _expected(state, model), velocity - state.mean[:, VELOCITY]], axis=1)
+    return _weighed(state, innovation, sensitivity, sigma, velocity_sigma, memory, model)
+
+
+def _expected(state: Estimate, model: Model) -> Floats:
+    """Where position sources should say that the tracks are, (n, 3): with their error, where one is allowed."""
+    place = state.mean[:, POSITION]
+    return place + state.mean[:, ERROR] if model.motion.error_sigma_m else place
+
+
+def _weighed(
+    state: Estimate,
+    innovation: Floats,
+    sensitivity: Floats,
+    sigma: Floats,
+    velocity_sigma: Floats,
+    memory: Floats,
+    model: Model,
+) -> tuple[Estimate, Innovation, Floats]:
+    """States after innovations (n, 6) of position and velocity, with the noise that the weighting gives them."""
+    speed_variance = np.broadcast_to((velocity_sigma * velocity_sigma)[:, None], (len(sigma), 3))
     variance = np.concatenate([sigma * sigma, speed_variance], axis=1)
     if model.memory:
         known = np.concatenate([memory, innovation[:, None, :3]], axis=1)
@@ -113,6 +145,52 @@ def update_with_fixes(
         memory = known[:, 1:]
     after, told = update(state, innovation, sensitivity, variance, ROBUST_SIGMA)
     return after, told, memory
+
+
+def update_in_part(
+    state: Estimate,
+    position: Floats,
+    sigma: Floats,
+    local: Sequence[Local],
+    velocity_sigma: Floats,
+    memory: Floats,
+    model: Model,
+) -> tuple[Estimate, Innovation, Floats]:
+    """States after reports that lack components: what there is counts along the axes at the reported points.
+
+    A latitude and a longitude name a straight line along the vertical there, so what the guessed height is changes nothing
+    in the horizontal. Where the vertical is less sure than the guess, it is brought to the guess's own sigma and no
+    further, however often the guess is repeated: it is always wrong in the same way.
+    """
+    axes = np.array([one.from_enu for one in local])
+    velocity = np.array([one.velocity_mps for one in local])
+    has_height = np.array([one.has_height for one in local])
+    sensitivity = np.zeros((len(local), 6, SIZE))
+    sensitivity[:, :3, POSITION] = sensitivity[:, 3:, VELOCITY] = axes
+    if model.motion.error_sigma_m:
+        sensitivity[:, :3, ERROR] = axes
+    off = np.concatenate(
+        [_along(axes, position - _expected(state, model)), velocity - _along(axes, state.mean[:, VELOCITY])], axis=1
+    )
+    off[~has_height, 2] = math.nan
+    after, told, memory = _weighed(state, off, sensitivity, sigma, velocity_sigma, memory, model)
+    up = axes[:, 2:, :]
+    spread = (up @ after.covariance[:, POSITION, POSITION] @ up.transpose(0, 2, 1))[:, 0, 0]
+    guess = sigma[:, 2] * sigma[:, 2]
+    loose = np.flatnonzero(~has_height & (spread > guess))
+    if len(loose):
+        above = np.zeros((len(loose), 1, SIZE))
+        above[:, :, POSITION] = up[loose]
+        height_off = _along(up[loose], position[loose] - after.mean[loose, POSITION])
+        noise = spread[loose] * guess[loose] / (spread[loose] - guess[loose])
+        bound, _ = update(Estimate(after.mean[loose], after.covariance[loose]), height_off, above, noise[:, None])
+        after.mean[loose], after.covariance[loose] = bound.mean, bound.covariance
+    return after, told, memory
+
+
+def _along(axes: Floats, vectors: Floats) -> Floats:
+    """Vectors (n, 3) along axes (n, k, 3), as (n, k)."""
+    return np.asarray((axes @ vectors[:, :, None])[:, :, 0])
 
 
 def update_with_plots(state: Estimate, polar: Floats, sigma: Floats, frame: RadarFrame) -> tuple[Estimate, Innovation]:

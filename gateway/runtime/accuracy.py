@@ -92,13 +92,15 @@ class Accuracy:
 
     def _gather(self, picture: Picture) -> None:
         align, fuse = picture.align, picture.fuse
-        self._wait("gps", align.report_aircraft, align.report_time, align.report_runway_m)
+        measured = np.flatnonzero(align.report_has_height)
+        reports_of = [align.report_aircraft[row] for row in measured]
+        self._wait("gps", reports_of, align.report_time[measured], align.report_runway_m[measured])
         aircraft_of = {radar_track: aircraft for aircraft, radar_track in picture.associate.pairs}
         plots_of = [aircraft_of.get(radar_track) for radar_track in align.plot_radar_track]
         self._wait("radar", plots_of, align.plot_time, align.plot_runway_m)
         states = np.array(fuse.state, dtype=object)
         for state in set(fuse.state):
-            rows = np.flatnonzero(states == state)
+            rows = np.flatnonzero((states == state) & np.isfinite(fuse.height_m))  # no height, no distance to the truth
             self._wait(state, [fuse.aircraft[row] for row in rows], fuse.time[rows], fuse.runway_m[rows])
         if not self._separation_is_given and len(fuse.time):
             separations = (fuse.height_m - fuse.altitude_msl_m)[np.isfinite(fuse.altitude_msl_m)]
@@ -112,6 +114,7 @@ class Accuracy:
 
     def _settle(self, now: int) -> None:
         """Score what the truth has caught up with, and let go of what it will not."""
+        self._waiting = defaultdict(list, {key: rows for key, rows in self._waiting.items() if rows})
         for (aircraft, kind), rows in self._waiting.items():
             truths = self._truths.get(aircraft)
             if truths is None or not truths.time or not rows:

@@ -47,6 +47,8 @@ TRACKS = pa.schema(
         ("straight", _REAL),
         ("left", _REAL),
         ("right", _REAL),
+        ("pressure_altitude_m", _REAL),  # never a height: it stands beside one, or where there is none
+        ("callsign", _TEXT),
     ]
 )
 
@@ -106,6 +108,8 @@ def tracks_batch(parts: Sequence[Fused]) -> pa.RecordBatch:
         *(_real(velocity[:, axis]) for axis in range(3)),
         pa.FixedSizeListArray.from_arrays(pa.array(covariance.reshape(-1)), 36),
         *(_real(modes[:, mode]) for mode in range(3)),
+        _real(np.concatenate([part.pressure_altitude_m for part in parts])),
+        _text([part.callsign for part in parts]),
     ]
     return pa.RecordBatch.from_arrays(columns, schema=TRACKS)
 

@@ -47,12 +47,15 @@ def picture(now: int, truths: list[Truth], reports: list[tuple[int, Any]], plots
             report_aircraft=("mavlink:1",) * len(reports),
             report_time=report_time,
             report_runway_m=report_m,
+            report_has_height=np.isfinite(report_m[:, 2]),
             plot_radar_track=("1/3",) * len(plots),
             plot_time=plot_time,
             plot_runway_m=plot_m,
         ),
         associate=SimpleNamespace(pairs=(("mavlink:1", "1/3"),)),
-        fuse=SimpleNamespace(state=(), aircraft=(), time=empty, runway_m=np.zeros((0, 3)), altitude_msl_m=empty),
+        fuse=SimpleNamespace(
+            state=(), aircraft=(), time=empty, runway_m=np.zeros((0, 3)), height_m=empty, altitude_msl_m=empty
+        ),
     )
 
 

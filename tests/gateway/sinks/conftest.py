@@ -92,6 +92,8 @@ class _Maker:
             modes=modes,
             runway_m=place,
             bias_m=np.tile([35.0, 40.0, 28.0], (n, 1)) * (1.0 - np.exp(-time_s / 60.0))[:, None],
+            pressure_altitude_m=np.full(n, np.nan),
+            callsign=none,
         )
 
     def predicted(self, time_s: float, track: int) -> Predicted:
@@ -144,6 +146,7 @@ class _Maker:
             (AIRCRAFT,) * gps,
             np.array([now - 1_000_000_000] * gps, dtype=np.int64),
             report if gps else empty,
+            np.ones(int(gps), dtype=np.bool_),
             (RADAR_TRACK,) * radar,
             np.array([now - 50_000_000] * radar, dtype=np.int64),
             plot if radar else empty,
