@@ -78,20 +78,16 @@ class UlogDamaged(ValueError):
 
 @dataclass(slots=True)
 class UlogFrames:
-    """The frames of a .ulg log. Counters: "values not usable", "damaged parts".
-
-    Raises UlogMissing and UlogDamaged when it is made.
-    """
+    """A .ulg log, read when it is made: raises UlogMissing and UlogDamaged."""
 
     path: Path
-    counters: Counter[str] = field(default_factory=Counter)
     identity: Identity = field(init=False)
     _topics: dict[str, Any] = field(init=False)
+    _is_damaged: bool = False
 
     def __post_init__(self) -> None:
         log = _load(self.path)
-        if log.file_corruption:
-            self.counters["damaged parts"] += 1
+        self._is_damaged = bool(log.file_corruption)
         present = {data.name: data for data in reversed(log.data_list) if data.multi_id == 0}
         chosen = [next((name for name in names if name in present), None) for names in _CHOICES]
         self._topics = {name: present[name].data for name in chosen if name is not None}
@@ -109,7 +105,7 @@ class UlogFrames:
         return next((values for _, _, values in self._entries(name)), {})
 
     def _utc_offset_us(self) -> int | None:
-        differences = []
+        differences: list[int] = []
         for name in ("vehicle_gps_position", "sensor_gps"):
             for at_us, _, fix in self._entries(name):
                 if fix.get("fix_type", 0) >= 3 and fix.get("time_utc_usec", 0) and len(differences) < FIXES_FOR_UTC:
@@ -127,9 +123,14 @@ class UlogFrames:
         for row in zip(*(columns[column] for column in names), strict=False):
             yield int(row[at]), order, {column: value.item() for column, value in zip(names, row, strict=True)}
 
-    def __iter__(self) -> Iterator[tuple[int, bytes]]:
-        """Stamp (ns since 1970 UTC, strictly increasing multiples of 4000) and frame."""
-        teller = _UlogTeller(Teller(self.identity, self.counters))
+    def frames(self, counters: Counter[str]) -> Iterator[tuple[int, bytes]]:
+        """Stamp (ns since 1970 UTC, strictly increasing multiples of 4000) and frame.
+
+        Counters: "values not usable", "damaged parts".
+        """
+        if self._is_damaged:
+            counters["damaged parts"] += 1
+        teller = _UlogTeller(Teller(self.identity, counters))
         names = list(self._topics)
         merged = heapq.merge(*(self._entries(name) for name in names), key=lambda entry: entry[:2])
         for at_us, order, values in merged:
