@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator
 
 from gateway.settings import DEMO_SITE, Site
-from sim.events import events
+from sim.run import play_part
 from sim.scenes import build_scene
 
 
@@ -51,16 +51,8 @@ class SimulatedWorld:
     def _send(self, ports: dict[str, int], stop: threading.Event) -> None:
         start_ns = (time.time_ns() - round(self._from_s * 1e9)) // 4000 * 4000
         scene = build_scene(self._name, start_ns=start_ns, site=DEMO_SITE, seed=self._seed)
-        began = time.monotonic() - self._from_s
-        with contextlib.ExitStack() as opened:
-            sockets = {
-                name: opened.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for name in scene.links
-            }
-            for event in events(scene):
-                second = (event.at - start_ns) / 1e9
-                if second < self._from_s:
-                    continue
-                if second > self._until_s or stop.wait(max(0.0, began + second - time.monotonic())):
-                    return
-                self._second = second
-                sockets[event.link].sendto(event.data, ("127.0.0.1", ports[event.link.partition(":")[0]]))
+        addresses = {kind: (socket.AF_INET, ("127.0.0.1", port)) for kind, port in ports.items()}
+        play_part(scene, addresses, from_s=self._from_s, until_s=self._until_s, stop=stop, progress=self._tell)
+
+    def _tell(self, second: float) -> None:
+        self._second = second

@@ -115,25 +115,14 @@ def _seen(heard: Iterable[Heard], radar: WatchingRadar) -> Iterator[tuple[int, b
 
 def _send(datagrams: Datagrams, radar_url: str, speed: float | None) -> int:
     """Send at their own intervals, `speed` times as fast; how many."""
-    from gateway.runtime.links import resolve
+    from gateway.runtime.pace import Datagram, Pace, find, send_paced
     from gateway.runtime.signals import StopSignals
     from gateway.runtime.urls import RADAR_PORT
 
     (url,) = take.read_urls([radar_url], RADAR_PORT)
-    family, address = resolve(url, socket.SOCK_DGRAM)
-    began, first, count = time.monotonic(), None, 0
-    with StopSignals() as stop, socket.socket(family, socket.SOCK_DGRAM) as out:
-        for at, data in datagrams:
-            first = at if first is None else first
-            while (
-                speed is not None and not stop() and (left := began + (at - first) / 1e9 / speed - time.monotonic()) > 0
-            ):
-                time.sleep(min(left, 0.1))
-            if stop():
-                break
-            out.sendto(data, address)
-            count += 1
-    return count
+    seen = (Datagram(at, "radar", "radar", data) for at, data in datagrams)
+    with StopSignals() as stop:
+        return sum(send_paced(seen, {"radar": find(url)}, Pace(speed, stop)).values())
 
 
 def _watch_link(
