@@ -14,10 +14,10 @@ is taken as a frame where some extra byte fits and where the stream goes on with
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from operator import itemgetter
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
@@ -32,18 +32,19 @@ _EXTRA: dict[int, bytes] = {number: bytes([message.crc_extra]) for number, messa
 _NUMBERS: dict[str, int] = {message.msgname: number for number, message in _MESSAGES.items()}
 
 
-def _crc_table() -> dict[int, int]:
-    """What one byte adds to a CRC: the reflected polynomial's 256 words, each with the byte that gives it."""
-    table = {}
+def _crc_words() -> tuple[int, ...]:
+    """What one byte adds to a CRC: the reflected polynomial's 256 words."""
+    words = []
     for byte in range(256):
         word = byte
         for _ in range(8):
             word = word >> 1 ^ (0x8408 if word & 1 else 0)
-        table[word] = byte
-    return table
+        words.append(word)
+    return tuple(words)
 
 
-_BYTE_OF_WORD = _crc_table()
+CRC_WORDS = _crc_words()
+_BYTE_OF_WORD = {word: byte for byte, word in enumerate(CRC_WORDS)}
 
 
 class Frame(NamedTuple):
@@ -250,6 +251,11 @@ def fields(name: str, *wanted: str) -> tuple[int, Callable[[bytes], tuple[Any, .
         return picked
 
     return int(message.id), read
+
+
+def definitions() -> Mapping[int, Any]:
+    """pymavlink's class of each message id that we know."""
+    return MappingProxyType(_MESSAGES)
 
 
 def message_name(number: int) -> str:

@@ -2,7 +2,8 @@
 
 Our own files hold strictly increasing multiples of 4 microseconds. In files of others the low two bits can carry a link's
 number, so they are masked; 3 means "sent by the ground station" where other values occur too, and such frames are left out.
-Stamps that cannot be are replaced by their neighbours', stamps that repeat or fall back are made to increase.
+Stamps that cannot be are replaced by their neighbours', stamps that repeat or fall back are made to increase. Which bytes
+are records after damage: records.py.
 """
 
 from __future__ import annotations
@@ -12,16 +13,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import BinaryIO, Protocol
 
-from adapters.mavlink_frames import LONGEST, V1, V2, parse
+import numpy as np
+from numpy.typing import NDArray
+
+from adapters.framing import Places
+from adapters.mavlink_frames import V1, V2, parse
+from adapters.records import MICROSECONDS_2200, Records, read_records
 
 STEP_NS = 4_000
 SECOND = 10**9
-_MICROSECONDS_2200 = 7_258_118_400 * 10**6
 _JUMP_NS = 3_600 * SECOND  # a single stamp further off than this is damage
 _FELL_BACK_NS = SECOND
-_BLOCK = 1 << 20
 _SENT_BY_STATION = 3
-_RECORD_AT_MOST = 8 + LONGEST + 9  # with the next record's stamp and magic
 
 
 class RecordSink(Protocol):
@@ -52,11 +55,11 @@ class _Stamps:
     before: int = -1
 
     def next(self, stamp: int, following: int | None) -> int:
-        """The stamp (ns, low bits masked) of a frame as it will be told; `following`: the next frame's, if known."""
+        """The stamp (ns, low bits masked; negative: none) of a frame as it will be told; `following`: the next one's."""
         if self.before >= 0:
             jump = stamp - self.before
-            returns = following is not None and abs(following - self.before) < _JUMP_NS
-            if abs(jump) > _JUMP_NS and returns:
+            returns = following is None or following < 0 or abs(following - self.before) < _JUMP_NS
+            if stamp < 0 or (abs(jump) > _JUMP_NS and following is not None and returns):
                 self.counters["bad timestamps"] += 1
                 stamp = self.before
             elif jump < -_FELL_BACK_NS:
@@ -65,6 +68,43 @@ class _Stamps:
         self.before = stamp
         self.last = max(stamp + self.shift, self.last + STEP_NS if self.last >= 0 else 0)
         return self.last
+
+    def many(self, stamps: Places, outgoing: NDArray[np.bool_], following: int | None) -> Places:
+        """The stamps of the frames of a block; those that the station sent keep theirs, moved as the others are."""
+        kept = stamps[~outgoing]
+        told = stamps + self.shift
+        jumps = np.diff(kept, prepend=self.before if self.before >= 0 else kept[:1])
+        if len(kept) and kept.min() >= 0 and jumps.min() >= -_FELL_BACK_NS and jumps.max() <= _JUMP_NS:
+            steps = STEP_NS * np.arange(1, len(kept) + 1)
+            floor = self.last if self.last >= 0 else -STEP_NS
+            told[~outgoing] = steps + np.maximum.accumulate(np.maximum(kept + self.shift - steps, floor))
+            self.before, self.last = int(kept[-1]), int(told[~outgoing][-1])
+            return told
+        after = [*stamps[1:].tolist(), following]
+        for index, stamp in enumerate(stamps.tolist()):
+            told[index] = stamp + self.shift if outgoing[index] else self.next(stamp, after[index])
+        return told
+
+
+def stamped(
+    blocks: Iterator[Records], counters: Counter[str]
+) -> Iterator[tuple[Records, NDArray[np.int64], NDArray[np.bool_]]]:
+    """Each block with its frames' stamps (ns since 1970 UTC) and which of them the ground station sent.
+
+    Without those that the station sent, stamps are strictly increasing over all blocks. Counters: "bad timestamps", "clock
+    set back", "sent by the ground station".
+    """
+    stamps = _Stamps(counters)
+    held = next(blocks, None)
+    tells_senders = held is not None and _tells_senders(held)
+    while held is not None:
+        coming = next(blocks, None)
+        following = None if coming is None else int(_masked(coming)[0])
+        outgoing = (held.micros & 3 == _SENT_BY_STATION) & (held.micros >= 0) & tells_senders
+        if outgoing.any():
+            counters["sent by the ground station"] += int(outgoing.sum())
+        yield held, stamps.many(_masked(held), outgoing, following), outgoing
+        held = coming
 
 
 @dataclass(slots=True)
@@ -78,79 +118,11 @@ class TlogReader:
 
     def __iter__(self) -> Iterator[tuple[int, bytes]]:
         """Stamp (ns since 1970 UTC, strictly increasing multiples of 4000) and frame."""
-        stamps = _Stamps(self.counters)
-        tells_senders: bool | None = None
-        pending: list[tuple[int, bytes]] = []  # until the first block tells what the low bits mean
-        previous: tuple[int, bytes] | None = None
-        low_bits: set[int] = set()
-        for micros, frame, first_block in self._records():
-            if first_block:
-                low_bits.add(micros & 3)
-                pending.append((micros, frame))
-                continue
-            if tells_senders is None:
-                tells_senders = _tells_senders(low_bits)
-            pending.append((micros, frame))
-            for record in pending:
-                if previous is not None and not self._is_outgoing(previous, tells_senders):
-                    yield stamps.next(_masked(previous), _masked(record)), previous[1]
-                previous = record
-            pending.clear()
-        yield from self._rest(stamps, previous, pending, _tells_senders(low_bits))
-
-    def _rest(
-        self,
-        stamps: _Stamps,
-        previous: tuple[int, bytes] | None,
-        pending: list[tuple[int, bytes]],
-        tells_senders: bool,
-    ) -> Iterator[tuple[int, bytes]]:
-        records = [*([previous] if previous else []), *pending]
-        for index, record in enumerate(records):
-            if not self._is_outgoing(record, tells_senders):
-                following = _masked(records[index + 1]) if index + 1 < len(records) else None
-                yield stamps.next(_masked(record), following), record[1]
-
-    def _is_outgoing(self, record: tuple[int, bytes], tells_senders: bool) -> bool:
-        outgoing = tells_senders and record[0] & 3 == _SENT_BY_STATION
-        self.counters["sent by the ground station"] += outgoing
-        return outgoing
-
-    def _records(self) -> Iterator[tuple[int, bytes, bool]]:
-        """Microseconds, frame, and whether it is of the first block; resynchronised after damage."""
-        data, first = b"", True
-        while True:
-            block = self.file.read(_BLOCK)
-            data += block
-            at, last = 0, not block
-            while len(data) - at >= _RECORD_AT_MOST or (last and at < len(data)):
-                end = record_end(data, at)
-                if end is None:
-                    goal = self._resync(data, at + 1, last)
-                    self.counters["cut at the end" if last and goal == len(data) else "bytes skipped"] += goal - at
-                    at = goal
-                    continue
-                yield int.from_bytes(data[at : at + 8], "big"), data[at + 8 : end], first
-                at = end
-            data, first = data[at:], first and at == 0
-            if last:
-                return
-
-    def _resync(self, data: bytes, at: int, last: bool) -> int:
-        """Where the next record begins at or after a place: one that is good by its checksum."""
-        limit = len(data) if last else len(data) - _RECORD_AT_MOST
-        while at < limit:
-            ones = [place for place in (data.find(b"\xfd", at + 8), data.find(b"\xfe", at + 8)) if place >= 0]
-            at = min(ones, default=len(data) + 8) - 8
-            if at >= limit:
-                return limit
-            end = record_end(data, at)
-            if end is not None:
-                frame = parse(data[at + 8 : end])
-                if frame is not None and frame.verdict == "good":
-                    return at
-            at += 1
-        return max(at, limit) if last else at
+        for records, told, outgoing in stamped(read_records(self.file, self.counters), self.counters):
+            data, frames = records.data, records.frames
+            begins, ends = frames.start[~outgoing].tolist(), frames.end[~outgoing].tolist()
+            for stamp, begin, end in zip(told[~outgoing].tolist(), begins, ends, strict=True):
+                yield stamp, data[begin:end]
 
 
 def record_end(data: bytes, at: int) -> int | None:
@@ -158,7 +130,7 @@ def record_end(data: bytes, at: int) -> int | None:
     end or to the next frame's magic, or whose checksum is right.
     """
     start = at + 8
-    if len(data) - start < 8 or int.from_bytes(data[at:start], "big") >= _MICROSECONDS_2200:
+    if len(data) - start < 8 or int.from_bytes(data[at:start], "big") >= MICROSECONDS_2200:
         return None
     if data[start] == V2 and len(data) - start >= 12:
         end = start + data[start + 1] + (25 if data[start + 2] & 1 else 12)
@@ -174,9 +146,10 @@ def record_end(data: bytes, at: int) -> int | None:
     return end if frame is not None and frame.verdict == "good" else None
 
 
-def _masked(record: tuple[int, bytes]) -> int:
-    return (record[0] & ~3) * 1000
+def _masked(records: Records) -> Places:
+    return np.where(records.micros < 0, -1, (records.micros & ~3) * 1000)
 
 
-def _tells_senders(low_bits: set[int]) -> bool:
-    return _SENT_BY_STATION in low_bits and len(low_bits) > 1
+def _tells_senders(first: Records) -> bool:
+    low_bits = np.unique(first.micros[first.micros >= 0] & 3)
+    return bool(_SENT_BY_STATION in low_bits and len(low_bits) > 1)

@@ -1,0 +1,200 @@
+"""Whole .tlog files as NumPy columns: one structured array a message, and one of all frames. Every checksum is checked.
+
+The same records, stamps and counters as TlogReader's. Layouts are pymavlink's own: payloads are padded with zeros, surplus
+bytes are ignored, and what v1 cannot carry (extensions) is zero.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adapters.framing import GOOD, VERDICTS, Bytes, rows
+from adapters.mavlink_frames import definitions, message_name
+from adapters.records import Records, read_records
+from adapters.tlog import stamped
+
+__all__ = ["FRAME", "VERDICTS", "Columns", "iter_columns", "message_dtype", "read_columns"]
+
+Structured = NDArray[Any]
+BLOCK_BYTES = 64 << 20
+
+FRAME = np.dtype(
+    [
+        ("received_at", "<i8"),  # ns since 1970 UTC
+        ("offset", "<i8"),  # of the frame in the file
+        ("message", "<u4"),
+        ("length", "u1"),  # of the payload as it was sent
+        ("system", "u1"),
+        ("component", "u1"),
+        ("sequence", "u1"),
+        ("version", "u1"),
+        ("signed", "?"),
+        ("verdict", "u1"),  # index into VERDICTS
+        ("outgoing", "?"),  # sent by the ground station that recorded the file
+    ]
+)
+_HEAD = [
+    ("received_at", "<i8"),
+    ("system", "u1"),
+    ("component", "u1"),
+    ("sequence", "u1"),
+    ("version", "u1"),
+    ("signed", "?"),
+]
+_BODY_AT = 16  # of a row: where the payload begins
+_TYPES = {
+    "char": "S1",
+    "float": "<f4",
+    "double": "<f8",
+    **{f"{sign}int{8 * size}_t": f"<{sign or 'i'}{size}" for sign in ("", "u") for size in (1, 2, 4, 8)},
+}
+
+
+@dataclass(frozen=True)
+class Columns:
+    """`messages`: by name, those that are good and were not sent by the recording ground station, in order of the file.
+
+    Their fields: `received_at` (ns since 1970 UTC), `system`, `component`, `sequence`, `version`, `signed`, then the
+    message's own in their declared order and the wire's units (see `message_dtype`). `frames`: all frames in order of the
+    file, dtype FRAME; without those that are `outgoing`, stamps are strictly increasing.
+    """
+
+    messages: Mapping[str, Structured]
+    frames: Structured
+
+
+@cache
+def message_dtype(number: int) -> np.dtype[Any]:
+    """The row of a message id. Arrays are subarrays, texts bytes; a field named as one of ours has "_" behind its name.
+
+    Raises KeyError for an unknown id.
+    """
+    message = definitions()[number]
+    kinds = dict(zip(message.fieldnames, message.fieldtypes, strict=True))
+    formats: dict[str, Any] = {}
+    places: dict[str, int] = {}
+    place = _BODY_AT
+    for name, repeats in zip(message.ordered_fieldnames, message.array_lengths, strict=True):
+        if kinds[name] == "char":
+            formats[name] = np.dtype(f"S{max(repeats, 1)}")
+        else:
+            one = np.dtype(_TYPES[kinds[name]])
+            formats[name] = np.dtype((one, (repeats,))) if repeats else one
+        places[name], place = place, place + formats[name].itemsize
+    head = np.dtype(_HEAD)
+    taken = head.names or ()
+    return np.dtype(
+        {
+            "names": [*taken, *(f"{name}_" if name in taken else name for name in message.fieldnames)],
+            "formats": [*(head[name] for name in taken), *(formats[name] for name in message.fieldnames)],
+            "offsets": [*range(0, 1), *range(8, 13), *(places[name] for name in message.fieldnames)],
+            "itemsize": place,
+        }
+    )
+
+
+def read_columns(
+    path_or_file: str | Path | BinaryIO,
+    wanted: Collection[str | int] | None = None,
+    counters: Counter[str] | None = None,
+) -> Columns:
+    """A whole .tlog. `wanted`: names or ids of the messages to unpack, None for all; `counters`: see TlogReader.
+
+    Never raises for what is in the file; raises OSError where it cannot be read, KeyError for a wanted name that no message has.
+    """
+    return _joined(list(iter_columns(path_or_file, wanted, counters)))
+
+
+def iter_columns(
+    path_or_file: str | Path | BinaryIO,
+    wanted: Collection[str | int] | None = None,
+    counters: Counter[str] | None = None,
+    *,
+    block_bytes: int = BLOCK_BYTES,
+) -> Iterator[Columns]:
+    """The same in blocks of about so many bytes of the file, so that a file of any length takes the memory of one block."""
+    kinds = _Kinds(wanted)
+    counted = Counter[str]() if counters is None else counters
+    opened = path_or_file if isinstance(path_or_file, str | Path) else None
+    with Path(opened).open("rb") if opened is not None else nullcontext(path_or_file) as file:
+        assert not isinstance(file, str | Path)
+        parts: list[Columns] = []
+        size = 0
+        for records, told, outgoing in stamped(read_records(file, counted), counted):
+            parts.append(_columns(records, told, outgoing, kinds))
+            size += len(records.data)
+            if size >= block_bytes:
+                yield _joined(parts)
+                parts, size = [], 0
+        if parts:
+            yield _joined(parts)
+
+
+class _Kinds:
+    """Wanted messages numbered from 0 by their ids; `of_message` finds the number of an id, -1 for what is not wanted."""
+
+    def __init__(self, wanted: Collection[str | int] | None) -> None:
+        known = definitions()
+        numbers = {message.msgname: number for number, message in known.items()}
+        chosen = known if wanted is None else {numbers[one] if isinstance(one, str) else one for one in wanted}
+        self.ids = sorted(set(chosen) & set(known))
+        self.names = [message_name(number) for number in self.ids]
+        self._of_message = np.full(max(known) + 2, -1, np.int16)
+        self._of_message[self.ids] = np.arange(len(self.ids))
+
+    def of_message(self, messages: NDArray[np.uint32]) -> NDArray[np.int16]:
+        """The number of each frame's kind."""
+        return self._of_message[np.minimum(messages, len(self._of_message) - 1)]
+
+
+def _columns(records: Records, told: NDArray[np.int64], outgoing: NDArray[np.bool_], kinds: _Kinds) -> Columns:
+    frames = records.frames
+    table = np.empty(len(told), FRAME)
+    table["received_at"], table["outgoing"] = told, outgoing
+    table["offset"] = frames.start + records.offset
+    for name in ("message", "length", "system", "component", "sequence", "version", "signed", "verdict"):
+        table[name] = getattr(frames, name)
+    kind = np.where((frames.verdict == GOOD) & ~outgoing, kinds.of_message(frames.message), -1).astype(np.int16)
+    order, payload = np.argsort(kind, kind="stable"), frames.payload
+    bounds = np.searchsorted(kind[order], np.arange(len(kinds.ids) + 1))
+    messages = {}
+    for index in np.flatnonzero(np.diff(bounds)).tolist():
+        some = order[bounds[index] : bounds[index + 1]]
+        dtype = message_dtype(kinds.ids[index])
+        messages[kinds.names[index]] = _unpacked(records.bytes, payload[some], table[some], dtype)
+    return Columns(messages, table)
+
+
+def _unpacked(block: Bytes, payload: NDArray[np.int64], heads: Structured, dtype: np.dtype[Any]) -> Structured:
+    size = dtype.itemsize - _BODY_AT
+    body = rows(block, payload, size)
+    short = np.flatnonzero(heads["length"] < size)
+    if len(short):
+        body[short] *= np.arange(size) < heads["length"][short, None]
+    found = np.zeros(len(payload), dtype)
+    raw = found.view(np.uint8).reshape(len(payload), dtype.itemsize)
+    raw[:, _BODY_AT:] = body
+    for name, _ in _HEAD:
+        found[name] = heads[name]
+    return found
+
+
+def _joined(parts: list[Columns]) -> Columns:
+    names = sorted({name for part in parts for name in part.messages})
+    messages = {name: _end_to_end([part.messages[name] for part in parts if name in part.messages]) for name in names}
+    return Columns(messages, _end_to_end([part.frames for part in parts]) if parts else np.empty(0, FRAME))
+
+
+def _end_to_end(arrays: list[Structured]) -> Structured:
+    dtype = arrays[0].dtype  # as bytes: field by field it takes ten times as long
+    whole: Structured = np.concatenate([one.view(np.dtype((np.void, dtype.itemsize))) for one in arrays]).view(dtype)
+    return whole
