@@ -25,7 +25,7 @@ def step(state: State, heard: Sequence[Heard], health: Health = Health()) -> tup
     work = Work(state, heard)
     for arrival in heard:
         work.predict_until(arrival)
-        if not arrival.observations:
+        if not work.takes(arrival):
             continue
         fixes, plots = work.align(arrival)
         tracked = work.track(plots)

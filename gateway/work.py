@@ -20,6 +20,8 @@ from gateway.track import Key, RadarTracks
 
 PLOT_MARGIN_S = 4.0  # plots are remembered this much longer than reports: a report's check looks back over them
 CONTRADICTION_M = 5.0  # between the site's and the streams' geoid: beyond this it is said
+NAMED_AT_MOST = 20  # sources whose times are unusable that are told by name
+STAGED = (GpsReport, RadarPlot, RadarStatus)
 
 Tracked = list[tuple[Plot, Key]]
 
@@ -108,6 +110,14 @@ class Work:
 
     # align --------------------------------------------------------------------------------------------------------
 
+    def takes(self, arrival: Heard) -> bool:
+        """Whether a stage reads any of it; attitudes, inertial samples, air and intents pass by, for the sinks."""
+        for observation in arrival.observations:
+            if isinstance(observation, STAGED):
+                return True
+        self.serial += len(arrival.observations)
+        return False
+
     def align(self, arrival: Heard) -> tuple[list[Fix], list[Plot]]:
         """The arrival's reports and plots in the site's frames; those whose time cannot be used are counted."""
         fixes, plots = [], []
@@ -188,8 +198,11 @@ class Work:
             return True
         late = at < now
         self.count("too late" if late else "from the future")
-        how = "late" if late else "ahead of the session's time"
-        self.once(f"{source} is more than {self.options.history_s:.0f} s {how}: such data are counted, not used")
+        side = "late" if late else "ahead of the session's time"
+        how = f"more than {self.options.history_s:.0f} s {side}"
+        named = sum(how in text for text in self.said) < NAMED_AT_MOST
+        who = f"{source} is" if named else "more sources are"
+        self.once(f"{who} {how}: such data are counted, not used")
         return False
 
     # track --------------------------------------------------------------------------------------------------------

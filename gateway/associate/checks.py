@@ -17,6 +17,8 @@ from gateway.track import Key, RadarTracks, name_of
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+FORGOTTEN_S = 60.0  # twice the time after which an aircraft's track ends, and after which it is nobody's rival
+
 
 @dataclass(frozen=True, slots=True)
 class Associated:
@@ -124,14 +126,29 @@ def check_again(state: Association, plot: Plot, tracks: RadarTracks, setting: Se
 
 
 def pruned(state: Association, before: int) -> Association:
-    """The same without checks older than an instant and spans that ended before it (the latest of each track stays)."""
+    """The same without checks older than an instant and spans that ended before it (the latest of each track stays).
+
+    Aircraft that were last checked long before it, and have no radar track, are forgotten with their counters.
+    """
     checks = tuple(check for check in state.checks if check.fix.at >= before)
     if len(checks) == len(state.checks):
         return state
     spans = state.ledger.spans
     latest = {span.key: span.index for span in spans}
     kept = tuple(s for s in spans if s.until is None or s.until >= before or s.index == latest[s.key])
-    return replace(state, checks=checks, ledger=replace(state.ledger, spans=kept))
+    return replace(state, checks=checks, ledger=_without_gone(replace(state.ledger, spans=kept), before))
+
+
+def _without_gone(ledger: Ledger, before: int) -> Ledger:
+    """The ledger without aircraft that nobody can remember: else each address that ever flew by would stay."""
+    longest = int(FORGOTTEN_S * SECOND)
+    gone = {aircraft for aircraft, at in ledger.checked_at.items() if at < before - longest}
+    gone -= {*ledger.pairs.values(), *(span.aircraft for span in ledger.spans)}
+    if not gone:
+        return ledger
+    checked_at = {aircraft: at for aircraft, at in ledger.checked_at.items() if aircraft not in gone}
+    counts = {pair: count for pair, count in ledger.counts.items() if pair[0] not in gone}
+    return replace(ledger, checked_at=checked_at, counts=counts)
 
 
 def missing(state: Association, tracks: RadarTracks) -> frozenset[Key]:
