@@ -11,6 +11,7 @@ from adapters import Arrival, Source
 from adapters.files import FileError
 from adapters.pcap import PcapReader
 from adapters.tlog import TlogReader
+from gateway.runtime.commands import read_commands
 
 
 @dataclass(slots=True)
@@ -32,6 +33,9 @@ class SessionInput:
                 if self.source.kind == "mavlink":
                     for stamp, frame in TlogReader(file, self.counters):
                         yield Arrival(stamp, self.source.number, frame)
+                elif self.source.kind == "told":
+                    for stamp, line in read_commands(file, self.counters):
+                        yield Arrival(stamp, self.source.number, line)
                 elif file.read(1):
                     file.seek(0)
                     for captured in PcapReader(file, self.counters):

@@ -8,6 +8,7 @@ had not flushed, and at worst leaves a cut last record, which every reader of th
 from __future__ import annotations
 
 import os
+from itertools import accumulate
 from pathlib import Path
 
 
@@ -26,6 +27,12 @@ class WholeFile:
         self._pending += record
         self._ends.append(len(self._pending))
         return len(record)
+
+    def write_all(self, records: list[bytes]) -> None:
+        """Add many records."""
+        size = len(self._pending)
+        self._pending += b"".join(records)
+        self._ends += accumulate(map(len, records), initial=size)
 
     def flush(self) -> None:
         """Hand everything to the operating system.
