@@ -38,6 +38,7 @@ class Outputs:
         watched: bool = True,
         publish: Url | None = None,
         publish_system: int = 1,
+        publish_leave_out: frozenset[str] = frozenset(),
     ) -> None:
         self._folder = folder
         self._sinks: list[Sink] = []
@@ -46,7 +47,7 @@ class Outputs:
         self._published: PublishSink | None = None
         if publish is not None:
             self._publisher = open_publisher(publish)
-            self._published = PublishSink(self._publisher.send, system=publish_system)
+            self._published = PublishSink(self._publisher.send, system=publish_system, leave_out=publish_leave_out)
             self._sinks.append(self._published)
         if folder is not None:
             separation_m = site.runway.geoid_separation_m or 0.0

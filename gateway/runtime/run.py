@@ -88,6 +88,7 @@ class Run:
                 watched=self.setup.is_watched,
                 publish=self.setup.publish,
                 publish_system=self.setup.publish_system,
+                publish_leave_out=self.setup.publish_leave_out,
             )
         except OSError as error:
             raise self._failure(error) from error

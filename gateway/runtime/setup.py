@@ -41,6 +41,7 @@ class Setup:
     serve: Serve | None = None  # None: no viewer can come
     publish: Url | None = None  # where tracks are told as MAVLink; None: they are not
     publish_system: int = 1  # the system, 1 to 255, whose ADS-B component we are there
+    publish_leave_out: frozenset[str] = frozenset()  # aircraft ("mavlink:1") that are not told of
     keys: Mapping[int, bytes] = field(default_factory=dict)  # a radar's number -> its key
     live: bool = False
     is_watched: bool = True  # False: drawn in large batches, for a replay as fast as it goes that nobody looks at

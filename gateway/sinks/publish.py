@@ -56,11 +56,15 @@ class _Told:
 class PublishSink:
     """Tells `send` one frame at a time, as the session's time goes on; `send` must not wait and must not raise.
 
-    `system`: what to publish as, see above. The counters are totals of what was told.
+    `system`: what to publish as, see above. `leave_out`: aircraft that are not told of: a vehicle that listens and that
+    avoids traffic must not be told of itself. The counters are totals of what was told.
     """
 
-    def __init__(self, send: Callable[[bytes], None], *, system: int = SYSTEM) -> None:
+    def __init__(
+        self, send: Callable[[bytes], None], *, system: int = SYSTEM, leave_out: frozenset[str] = frozenset()
+    ) -> None:
         self._send = send
+        self._leave_out = leave_out
         self._encoder = FrameEncoder(system, COMPONENT)
         self._tracks: dict[int, _Told] = {}
         self._heartbeat_due = 0
@@ -80,7 +84,8 @@ class PublishSink:
         for track, told in self._tracks.items():
             if not 0 < told.due - now <= _SECOND:
                 told.due = _next(told.due, now)
-                self._tell(track, told, now)
+                if told.fused.aircraft[told.row] not in self._leave_out:
+                    self._tell(track, told, now)
 
     def flush(self, now: int) -> None:
         """Nothing waits."""

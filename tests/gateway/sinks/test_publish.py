@@ -223,6 +223,13 @@ def test_frames_are_those_of_the_ads_b_component_of_the_chosen_system_in_sequenc
     assert [one.get_seq() for one in read] == list(range(len(read)))
 
 
+def test_an_aircraft_that_is_left_out_is_not_told_of() -> None:
+    told = Told(leave_out=frozenset({"mavlink:1"}))
+    told.at(0.0, row(1, 0.0), row(2, 0.0))
+    told.until(3.0)
+    assert {one.callsign for _, one in told.reports()} == {"MAV2"}
+
+
 @pytest.mark.parametrize("jump_s", [-3600.0, 3600.0])
 def test_a_session_whose_time_is_set_goes_on_telling(jump_s: float) -> None:
     told = Told()
