@@ -51,7 +51,8 @@ def _extras() -> NDArray[np.int16]:
     return extras
 
 
-_ONE, _TWO, _WHICH, _EXTRAS = _one_byte(), _two_bytes(), _which_byte(), _extras()
+ONE_BYTE, TWO_BYTES, EXTRAS = _one_byte(), _two_bytes(), _extras()  # steps of the CRC; the extra of each id or -1
+_WHICH = _which_byte()
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +122,7 @@ def _verdicts(block: Bytes, start: Places, size: Places, message: NDArray[np.uin
     told = rows(block, start + size, 2).view("<u2")[:, 0]
     which = _WHICH[told ^ crc >> 8]
     needed = np.where(which < 0, np.int16(-1), which ^ (crc & 255).astype(np.int16))
-    ours = _EXTRAS[np.minimum(message, len(_EXTRAS) - 1)]
+    ours = EXTRAS[np.minimum(message, len(EXTRAS) - 1)]
     verdict = np.where(ours < 0, UNKNOWN_ID, np.where(needed == ours, GOOD, DIFFERS))
     return np.where(which < 0, BAD_CHECKSUM, verdict).astype(np.uint8)
 
@@ -129,7 +130,7 @@ def _verdicts(block: Bytes, start: Places, size: Places, message: NDArray[np.uin
 def checksums(block: Bytes, start: Places, size: Places) -> NDArray[np.uint16]:
     """The CRC-16/MCRF4XX of `size` bytes (at most LONGEST) from each place of a padded block on, without any extra."""
     odd = size & 1
-    first = _ONE[block[start] ^ 0xFF] ^ np.uint16(0xFF)  # one byte on, so that the rest is a whole number of words
+    first = ONE_BYTE[block[start] ^ 0xFF] ^ np.uint16(0xFF)  # one byte on, so that the rest is a whole number of words
     crc = np.where(odd == 1, first, np.uint16(0xFFFF))
     begin, words = start + odd, (size >> 1).astype(np.uint16)
     order = np.argsort(words, kind="stable")[::-1]
@@ -148,5 +149,5 @@ def _by_columns(cut: Bytes, words: NDArray[np.uint16], crc: NDArray[np.uint16]) 
     longest = int(words[0]) if len(words) else 0
     going_on = np.searchsorted(-words.astype(np.int32), -np.arange(longest), side="left")
     for column, many in zip(columns, going_on.tolist(), strict=False):
-        crc[:many] = _TWO[crc[:many] ^ column[:many]]
+        crc[:many] = TWO_BYTES[crc[:many] ^ column[:many]]
     return crc
