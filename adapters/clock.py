@@ -3,98 +3,68 @@
 A frame's arrival says little about when it was measured: radio links hold frames back for seconds. So the time of a
 measurement is the source's own time since boot, brought to UTC by the median offset of its SYSTEM_TIME messages. A source
 that has told no UTC runs on the lower envelope of (received - boot): the least delayed frame lately heard sets its clock.
+
+When a source passes from the envelope to UTC (GPS lock in the middle of a flight), or sets its date anew, its times step.
+What falls into times that it has already told by the clock before is marked FOREIGN: shown, not fused, so that no track
+is pulled to and fro. A source that gave the session its epoch and then sets another date keeps the date it began with.
 """
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
-from statistics import median_low
+from statistics import median, median_low
 
+from adapters.meters import SECOND as SECOND
+from adapters.meters import Delays, Envelope, SpeedMeter
 from gateway.observation import Timing
 
-SECOND = 10**9
 LIMIT_NS = 5 * SECOND  # a source whose clock is further from the session's is foreign
 _MILLISECOND = 10**6
 _WRAP_MS = 1 << 32  # 49.7 days
 _NEAR_WRAP_MS = 3_600_000
 _REBOOT_MS = 1000
 _LATE_MS = 10_000  # a step back by less can be a frame that was held back
-_LEAST_UTC_NS = 10**18  # 2001: a smaller "UTC" is a time since boot
+_LEAST_UTC_NS = (
+    1_230_768_000 * SECOND
+)  # 2009, when MAVLink began: less is a time since boot, or a GPS week that rolled over
 _GREATEST_UTC_NS = 7_258_118_400 * SECOND  # 2200
 _OFFSETS = 31
 _STEP_NS = SECOND // 2
-_BUCKET_NS = 30 * SECOND
-_SPEED_WINDOW_NS = 2 * SECOND
 _ENVELOPE_AFTER_NS = 15 * SECOND
-
-
-@dataclass(slots=True)
-class Envelope:
-    """The least of a value over the last 30 to 60 s."""
-
-    _since: int = 0
-    _least: int | None = None
-    _before: int | None = None
-
-    def hear(self, at: int, value: int) -> int:
-        """Take a value in; the least one lately heard."""
-        if self._least is None:
-            self._since, self._least = at, value
-        elif at - self._since >= _BUCKET_NS:
-            self._since, self._before, self._least = at, self._least, value
-        elif value < self._least:
-            self._least = value
-        return self._least if self._before is None else min(self._least, self._before)
-
-
-@dataclass(slots=True)
-class SpeedMeter:
-    """How fast a source's clock runs against ours: 1, or what two windows of 2 s agree on; None while not known.
-
-    A link that stalls and then delivers everything at once makes one window slow and the next fast; a simulator that
-    runs at another speed makes them alike. So windows have to agree before a speed other than 1 is believed.
-    """
-
-    needed: int = 2
-    speed: float | None = None
-    _begin: tuple[int, int] | None = None
-    _ratios: deque[float] = field(default_factory=lambda: deque(maxlen=3))
-
-    def hear(self, received_at: int, source_ns: int) -> None:
-        """Take in a pair of our time and the source's."""
-        if self._begin is None or source_ns < self._begin[1]:
-            self._begin = (received_at, source_ns)
-            return
-        elapsed = received_at - self._begin[0]
-        if elapsed < _SPEED_WINDOW_NS:
-            return
-        ratio = (source_ns - self._begin[1]) / elapsed
-        self._begin = (received_at, source_ns)
-        self._ratios.append(ratio)
-        lately = list(self._ratios)[-self.needed :]
-        if 0.8 <= ratio <= 1.25:
-            self.speed = 1.0
-        elif len(lately) == self.needed and max(lately) <= 1.25 * min(lately):
-            self.speed = sum(lately) / len(lately)
-            self.needed = 3  # once settled, a change needs more
+_YOUNG_MS = 60_000  # a small step back is a reboot only where the time since boot is this short
+_STRAGGLER_MS = 10_000
+_SAME_BASE_NS = 50 * _MILLISECOND
+_LEAST_SIGMA_S = 1e-3  # times are told in whole ms
+_SIBLINGS_APART_NS = 2 * SECOND
 
 
 @dataclass(slots=True)
 class SourceClock:
-    """The clock of one (source, system, component)."""
+    """The clock of one (source, system, component). `siblings`: clocks of the same component heard over other links."""
 
+    key: object = None
     utc_offset: int | None = None  # UTC minus time since boot, ns
     reboots: int = 0
+    pinned: bool = False  # the session runs on its date: a new date is not followed
+    date_steps: int = 0  # new dates that were not followed
     speed: SpeedMeter = field(default_factory=SpeedMeter)
+    delays: Delays = field(default_factory=Delays)
+    siblings: list[SourceClock] = field(default_factory=list)
     _first_heard: int | None = None
     _last_ms: int = -1
     _wraps: int = 0
     _last: tuple[int, int] = (0, 0)  # time since boot and stamp of the newest frame
     _suspects: list[tuple[int, int]] = field(default_factory=list)
+    _before: tuple[int, int, int] | None = None  # before the reboot: newest ms, least delay, and when it was noticed
     _offsets: deque[int] = field(default_factory=lambda: deque(maxlen=_OFFSETS))
+    _told_utc: int = -1  # time since boot of the last SYSTEM_TIME
     _envelope: Envelope = field(default_factory=Envelope)
     _least: int = 0
+    _base: int | None = None  # what was last added to the time since boot
+    _newest: int = 0  # the newest time that was made with it
+    _floor: int = 0  # the newest time that was made with the one before
 
     def hear(self, boot_ms: int, received_at: int) -> int | None:
         """Time since boot (ns, unwrapped) of a frame; None while it cannot be told whether the source has rebooted.
@@ -105,7 +75,7 @@ class SourceClock:
             self._first_heard = received_at
         wrapped = False
         step = boot_ms - self._last_ms
-        if self._last_ms >= 0 and step < -_REBOOT_MS:
+        if step < -_REBOOT_MS and self._last_ms >= 0:
             wrapped = self._last_ms > _WRAP_MS - _NEAR_WRAP_MS and boot_ms < _NEAR_WRAP_MS
             if wrapped:
                 self._wraps += 1
@@ -113,52 +83,79 @@ class SourceClock:
                 placed = self._step_back(boot_ms, received_at)
                 if placed is not None or self._last_ms >= 0:
                     return placed
-        elif step > _WRAP_MS // 2 and self._wraps:  # held back from before the wrap
+        elif step > _STRAGGLER_MS and self._wraps and step > _WRAP_MS // 2:  # held back from before the wrap
             return (boot_ms + (self._wraps - 1) * _WRAP_MS) * _MILLISECOND
-        else:
+        elif step > _STRAGGLER_MS and self._before and self._is_straggler(boot_ms, received_at):
+            return None
+        elif self._suspects:
             self._suspects.clear()
         boot_ns = (boot_ms + self._wraps * _WRAP_MS) * _MILLISECOND
-        if boot_ms > self._last_ms or wrapped:
+        if step > 0 or wrapped or self._last_ms < 0:
             self._last_ms, self._last = boot_ms, (boot_ns, received_at)
             self.speed.hear(received_at, boot_ns)
-        self._least = self._envelope.hear(received_at, received_at - boot_ns)
+        delay = received_at - boot_ns
+        self._least = least = self._envelope.hear(received_at, delay)
+        self.delays.hear(received_at, delay - least)
         return boot_ns
 
     def _step_back(self, boot_ms: int, received_at: int) -> int | None:
         """A time more than a second before the newest: placed by the old clock, or kept as a suspect of a reboot."""
         back_ms = self._last_ms - boot_ms
+        placed = (boot_ms + self._wraps * _WRAP_MS) * _MILLISECOND
+        if back_ms <= _LATE_MS and boot_ms >= _YOUNG_MS:
+            return placed  # over a slower path of the same link
         offset = received_at // _MILLISECOND - boot_ms
         if self._suspects and abs(offset - self._suspects[-1][1]) > 500:
             self._suspects.clear()
-        self._suspects.append((received_at, offset))
+        if len(self._suspects) < 5:
+            self._suspects.append((received_at, offset))
         span = received_at - self._suspects[0][0]
         if len(self._suspects) >= 3 if back_ms > _LATE_MS else len(self._suspects) >= 5 and span >= SECOND:
-            self._reboot()
+            self._reboot(received_at)
             return None
-        return None if back_ms > _LATE_MS else (boot_ms + self._wraps * _WRAP_MS) * _MILLISECOND
+        return None if back_ms > _LATE_MS else placed
 
-    def _reboot(self) -> None:
+    def _reboot(self, received_at: int) -> None:
         self.reboots += 1
-        self.utc_offset, self._last_ms, self._wraps = None, -1, 0
+        self._before = (self._last_ms, self._least, received_at)
+        self.utc_offset, self._last_ms, self._wraps, self._told_utc = None, -1, 0, -1
         self._first_heard = self._suspects[0][0]
         self._suspects.clear()
         self._offsets.clear()
-        self._envelope, self.speed = Envelope(), SpeedMeter()
+        self._envelope, self.speed, self.delays = Envelope(), SpeedMeter(), Delays()
+
+    def _is_straggler(self, boot_ms: int, received_at: int) -> bool:
+        """Whether a frame that leaps ahead is one from before the reboot, held back until after it."""
+        assert self._before is not None
+        newest_ms, least, noticed = self._before
+        if received_at - noticed > 60 * SECOND:
+            self._before = None
+            return False
+        return boot_ms <= newest_ms + _STRAGGLER_MS and received_at - boot_ms * _MILLISECOND >= least - SECOND
 
     def set_utc(self, boot_ns: int, unix_ns: int) -> bool:
         """What a SYSTEM_TIME says; whether it said a UTC at all. Two that agree set the clock.
 
-        A single one could be what a receiver believes before its fix.
+        A single one could be what a receiver believes before its fix; the same one heard twice is a single one.
         """
         if not _LEAST_UTC_NS <= unix_ns < _GREATEST_UTC_NS:
             return False
+        if boot_ns == self._told_utc:
+            return True
+        self._told_utc = boot_ns
         offset = unix_ns - boot_ns
         if self._offsets and abs(offset - self._offsets[-1]) > _STEP_NS:
             self._offsets.clear()  # the source set its clock, or did before: only one of them is right
         self._offsets.append(offset)
         if len(self._offsets) >= 2:
-            self.utc_offset = median_low(self._offsets)
+            self._adopt(median_low(self._offsets))
         return True
+
+    def _adopt(self, offset: int) -> None:
+        if self.pinned and self.utc_offset is not None and abs(offset - self.utc_offset) >= LIMIT_NS:
+            self.date_steps += len(self._offsets) == 2
+            return
+        self.utc_offset = offset
 
     def boot_at(self, received_at: int) -> int:
         """Time since boot of a frame that carries none: the newest one heard, and the time since then."""
@@ -169,8 +166,49 @@ class SourceClock:
         return None if self.utc_offset is None else boot_ns + self.utc_offset
 
     def by_envelope(self, boot_ns: int) -> int:
-        """The receiver's time when this was so, by the least delayed frame lately heard."""
-        return boot_ns + self._least
+        """The receiver's time when this was so, by the least delayed frame lately heard, over whichever link."""
+        least = self._least
+        for sibling in self.siblings:
+            if sibling._agrees_with(self):
+                least = min(least, sibling._least)
+        return boot_ns + least
+
+    def _agrees_with(self, other: SourceClock) -> bool:
+        """Whether both are of the same boot, as far as the delays of their links tell."""
+        return self._last_ms >= 0 and abs(self._least - other._least) < _SIBLINGS_APART_NS
+
+    def authority(self) -> SourceClock:
+        """The clock that knows this boot's UTC: this one, else one of its siblings; this one where none knows it."""
+        if self.utc_offset is None:
+            for sibling in self.siblings:
+                if sibling.utc_offset is not None and sibling._agrees_with(self):
+                    return sibling
+        return self
+
+    def least_delay(self) -> int | None:
+        """The least (received - boot) lately heard, ns; None before the first frame."""
+        return self._least if self._last_ms >= 0 else None
+
+    def step_to(self, valid: int, base: int) -> bool:
+        """Note a time that was made by adding `base`; whether it falls into what was told by another base before.
+
+        A step back by more than 5 s is another time altogether, and no overlap.
+        """
+        if self._base is None or abs(base - self._base) > _SAME_BASE_NS:
+            self._floor = self._newest if self._base is not None and self._newest - valid < LIMIT_NS else 0
+            self._newest = max(self._floor, valid)
+        elif valid > self._newest:
+            self._newest = valid
+        self._base = base
+        return valid <= self._floor
+
+    def sigma_s(self) -> float:
+        """How well the time is known, 1 sigma, s: by the spread of UTC offsets, else of delays; NaN = not known yet."""
+        if self.utc_offset is not None and len(self._offsets) >= 2:
+            middle = median_low(self._offsets)
+            return max(1.4826e-9 * median(abs(one - middle) for one in self._offsets), _LEAST_SIGMA_S)
+        (typical,) = self.delays.quantiles(0.5)
+        return typical if math.isnan(typical) else max(typical, _LEAST_SIGMA_S)
 
     def is_old(self, received_at: int) -> bool:
         """Whether it has been heard for 15 s: then the envelope is as good as it gets."""
@@ -199,6 +237,7 @@ class SessionEpoch:
     speed: float = 1.0
     _anchor: tuple[int, int] = (0, 0)  # (stamp, session time)
     _lag: dict[object, int] = field(default_factory=dict)
+    _agreed: int = 0  # the reference's lag, as far as it never leapt
     _envelopes: dict[object, Envelope] = field(default_factory=dict)
 
     def session_time(self, received_at: int) -> int:
@@ -220,10 +259,13 @@ class SessionEpoch:
             self.offset_s = 0 if abs(difference) < LIMIT_NS else round(difference / SECOND)
             self._anchor = (received_at, received_at + self.offset_s * SECOND)
             self.reference, settled = source, True
-        if source == self.reference:
+        is_far = self._lag.get(source) is not None and self.timing(source) is Timing.FOREIGN
+        if source == self.reference and not is_far:
             self._follow(utc, received_at, speed or 1.0)
         envelope = self._envelopes.setdefault(source, Envelope())
-        self._lag[source] = envelope.hear(received_at, self.session_time(received_at) - utc)
+        self._lag[source] = lag = envelope.hear(received_at, self.session_time(received_at) - utc)
+        if source == self.reference and (settled or abs(lag - self._agreed) < LIMIT_NS):
+            self._agreed = lag
         return settled
 
     def _follow(self, utc: int, received_at: int, speed: float) -> None:
@@ -246,10 +288,20 @@ class SessionEpoch:
         lag = self._lag.get(source)
         if lag is None:
             return Timing.PROVISIONAL
-        if source == self.reference or abs(lag - self._lag[self.reference]) < LIMIT_NS:
-            return Timing.UTC
-        return Timing.FOREIGN
+        return Timing.UTC if abs(lag - self._agreed) < LIMIT_NS else Timing.FOREIGN
 
     def lag_s(self, source: object) -> float:
         """How far a source's clock is behind the session's."""
         return self._lag.get(source, 0) / SECOND
+
+    def when(self, clock: SourceClock, boot_ns: int, received_at: int) -> tuple[int, Timing]:
+        """The session's time of a source's time since boot, and how far that can be trusted."""
+        told = clock.authority()
+        utc = told.utc(boot_ns)
+        timing = Timing.PROVISIONAL if utc is None else self.timing(told.key)
+        if utc is None or timing is Timing.PROVISIONAL:
+            utc = clock.by_envelope(boot_ns) + self.session_time(received_at) - received_at
+            timing = Timing.ENVELOPE if clock.is_old(received_at) else Timing.PROVISIONAL
+        else:
+            told.pinned = told.key == self.reference
+        return utc, (Timing.FOREIGN if clock.step_to(utc, utc - boot_ns) else timing)

@@ -10,9 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from adapters import Arrival, Source
-from adapters.clock import SECOND, SessionEpoch, SpeedMeter
+from adapters.clock import SessionEpoch
 from adapters.mavlink import MavlinkObserver
 from adapters.mavlink_frames import parse
+from adapters.meters import SECOND, SpeedMeter
 from adapters.radar import LandingRadarReceiver, Taken, observations
 from gateway.observation import Heard, Observation, Timing
 from gateway.picture import Health, SourceHealth

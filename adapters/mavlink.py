@@ -19,11 +19,12 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from adapters.clock import SECOND, SessionEpoch
+from adapters.clock import SessionEpoch
 from adapters.fixes import GLOBAL_POSITION_INT, GPS_RAW_INT, fix_time
 from adapters.mavlink_frames import Frame, fields
+from adapters.meters import SECOND
 from adapters.plans import MISSION_MESSAGES, overheard
-from adapters.vehicles import INVALID_AUTOPILOT, STATIONS, Component, Registry, Vehicle
+from adapters.vehicles import Component, Registry, Vehicle
 from gateway.observation import Attitude, FlightPlan, Observation, Timing, Truth, VehicleStatus
 
 HEARTBEAT, _read_heartbeat = fields("HEARTBEAT", "type", "autopilot", "base_mode", "custom_mode")
@@ -37,7 +38,6 @@ _ARMED = 128
 _NO_POSITION_NS = 10 * SECOND
 _FIX_NOTES = 6  # a fix that comes and goes is told so often and no more
 _DEGE7 = math.pi / 180.0 / 1e7
-_BOOT_MS = {ATTITUDE: slice(0, 4), GLOBAL_POSITION_INT: slice(0, 4)}
 
 Observations = tuple[Observation, ...]
 
@@ -84,19 +84,14 @@ class MavlinkObserver:
             self._role(component, frame)
         if not component.is_vehicle:
             return ()
-        evidence = (message, frame.payload) if message in _BOOT_MS and _tells_apart(message, frame.payload) else None
-        vehicle = self.registry.vehicle(source, system, evidence, received_at, counters)
+        vehicle = self.registry.hear(component, frame, received_at, counters)
         if vehicle is None:
-            counters["undecided"] += 1
-            return ()
-        if vehicle.is_echo((frame.component, frame.sequence, message, frame.payload)) and message != SYSTEM_TIME:
-            counters["heard twice"] += 1
             return ()
         return reader(_Heard(component, vehicle, frame.payload, received_at, counters))
 
     def _role(self, component: Component, frame: Frame) -> None:
         kind, autopilot, _, _ = _read_heartbeat(frame.payload)
-        component.is_vehicle = autopilot != INVALID_AUTOPILOT and kind not in STATIONS
+        component.take_role(kind, autopilot)
 
     def _heartbeat(self, heard: _Heard) -> Observations:
         kind, autopilot, base_mode, custom_mode = _read_heartbeat(heard.payload)
@@ -264,15 +259,7 @@ class MavlinkObserver:
 
     def _time(self, component: Component, boot_ns: int, received_at: int) -> tuple[int, Timing]:
         """When something was so in the session's time, and how far that can be trusted."""
-        clock = component.clock
-        utc = clock.utc(boot_ns)
-        if utc is not None:
-            timing = self.epoch.timing(component.key)
-            if timing is not Timing.PROVISIONAL:
-                return utc, timing
-        shift = self.epoch.session_time(received_at) - received_at
-        timing = Timing.ENVELOPE if clock.is_old(received_at) else Timing.PROVISIONAL
-        return clock.by_envelope(boot_ns) + shift, timing
+        return self.epoch.when(component.clock, boot_ns, received_at)
 
 
 @dataclass(slots=True)
@@ -288,11 +275,6 @@ class _Heard:
 
 _LATEST_FIX = 10 * SECOND  # a fix told later than this is not believed to be of that time
 _SLOWEST_POSITION = 12 * SECOND  # a vehicle that sends no position for this long sends none
-
-
-def _tells_apart(message: int, payload: bytes) -> bool:
-    """Whether two vehicles would not send this alike: positions of all zeros they would."""
-    return message == ATTITUDE or payload[4:12].strip(b"\0") != b""
 
 
 def _no_position(vehicle: Vehicle) -> str:

@@ -1,8 +1,8 @@
 """When what a frame says was so, in the session's time: by its source's own clock, else by the time of its receipt.
 
-    time_boot_ms      ms since boot: sets the source's clock, wraps after 49.7 days
-    time_usec         microseconds since boot, or since 1970 UTC where it is greater than 10^15
-    no time at all    the newest time since boot that the component has told, and what has passed since
+time_boot_ms      ms since boot: sets the source's clock, wraps after 49.7 days
+time_usec         microseconds since boot, or since 1970 UTC where it is greater than 10^15
+no time at all    the newest time since boot that the component has told, and what has passed since
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from adapters.clock import LIMIT_NS, SECOND, SessionEpoch, SpeedMeter
+from adapters.clock import LIMIT_NS, SessionEpoch
+from adapters.meters import SECOND, SpeedMeter
 from adapters.vehicles import Component, Vehicle
 from gateway.observation import Observation, Timing
 
@@ -58,15 +59,7 @@ class Moments:
 
     def when(self, component: Component, boot_ns: int, received_at: int) -> When:
         """The session's time of a time since boot, and how far that can be trusted."""
-        clock = component.clock
-        utc = clock.utc(boot_ns)
-        if utc is not None:
-            timing = self.epoch.timing(component.key)
-            if timing is not Timing.PROVISIONAL:
-                return utc, timing
-        shift = self.epoch.session_time(received_at) - received_at
-        timing = Timing.ENVELOPE if clock.is_old(received_at) else Timing.PROVISIONAL
-        return clock.by_envelope(boot_ns) + shift, timing
+        return self.epoch.when(component.clock, boot_ns, received_at)
 
     def at_receipt(self, component: Component, received_at: int) -> When:
         """When a frame that carries no time was sent, as far as the component's other frames tell."""
@@ -78,7 +71,9 @@ class Moments:
     def near(self, component: Component, usec: int, received_at: int) -> When:
         """When a time_usec was that is not to set the source's clock; the time of receipt where it is of another clock."""
         boot_ns = self.since_boot(component, usec, received_at)
-        return self.at_receipt(component, received_at) if boot_ns is None else self.when(component, boot_ns, received_at)
+        return (
+            self.at_receipt(component, received_at) if boot_ns is None else self.when(component, boot_ns, received_at)
+        )
 
     def since_boot(self, component: Component, usec: int, received_at: int) -> int | None:
         """A time_usec as time since boot, ns; None where it is UTC, or further than 10 s from the component's newest."""

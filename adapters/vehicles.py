@@ -1,32 +1,43 @@
 """Who is who on MAVLink: which (source, system, component) is a vehicle, and which of them are the same vehicle.
 
-A vehicle is a component whose HEARTBEAT names an autopilot and a type that moves. Before its first heartbeat component 1
-is taken for a vehicle (by custom it is the autopilot), every other component is not.
+What is a vehicle: roles.py. The first vehicle of a system number is "mavlink:N". When the same number appears on a second
+source while the first is alive, it is either the same vehicle over two links or another one. A frame that was heard on
+the other source too, bit for bit, makes them one; else what they say of their motion decides (likeness.py). Until then, for
+10 s at most, the second source is not used. The second vehicle is "mavlink:N@2". A number that comes back on another
+source after 5 s of silence is the same vehicle. Two that were taken for one and then fly more than 50 m apart for 3 s are
+two from then on, and that is said.
 
-The first vehicle of a system number is "mavlink:N". When the same number appears on a second source while the first is
-alive, it is either the same vehicle over two links or another one: attitudes and positions are compared. One that was
-heard on the other source too, bit for bit, makes them one. Twenty that were not, over more than 1.5 s, make them two, and
-the second is "mavlink:N@2". A number that comes back on another source after 5 s of silence is the same vehicle.
+Of a vehicle over several links, what carries a time is used from all of them, each time once. What carries none is used
+from one link, for each kind of message the one that is the least delayed: else a late one would tell what is over.
 """
 
 from __future__ import annotations
 
 from collections import Counter, deque
 from dataclasses import dataclass, field
+from struct import Struct
 
 from adapters.clock import SourceClock
 from adapters.fixes import Fixes
-from adapters.mavlink_frames import SequenceCheck
+from adapters.likeness import ATTITUDE, GLOBAL_POSITION_INT, Likeness, Trace
+from adapters.mavlink_frames import Frame, SequenceCheck
+from adapters.meters import Rates
 from adapters.plans import PlanBook
+from adapters.roles import ARDUPILOT as ARDUPILOT
+from adapters.roles import INVALID_AUTOPILOT as INVALID_AUTOPILOT
+from adapters.roles import PX4 as PX4
+from adapters.roles import STATIONS as STATIONS
+from adapters.roles import by_heartbeat, by_number, is_vehicle
 from gateway.observation import VehicleStatus
 
-INVALID_AUTOPILOT = 8
-# GCS, antenna tracker, onboard controller, gimbal, ADS-B, camera, charging station, FLARM, servo, ODID, battery,
-# parachute, log, OSD, IMU, GPS, winch: they ride along or stand beside
-STATIONS = frozenset((5, 6, 18, 26, 27, 30, 31, 32, 33, 34, 36, 37, 38, 39, 40, 41, 42))
+SYSTEM_TIME = 2
+_UTC = Struct("<QI")
+# messages that begin with a time, and how many bytes of it: boot_ms or time_usec
+_TIMED = {26: 4, 27: 8, 29: 4, ATTITUDE: 4, 31: 4, 32: 4, GLOBAL_POSITION_INT: 4, 63: 8, 105: 8, 116: 4, 129: 4, 340: 8}
 _ALIVE_NS = 5 * 10**9
-_TRIALS, _TRIAL_NS = 20, 1_500_000_000
+_TELLS_NS = 3 * 10**9  # after so long a silence another link's word is taken
 _REMEMBERED = 256
+_TIMES = 1024
 
 
 @dataclass(slots=True)
@@ -48,16 +59,16 @@ class Vehicle:
     last_attitude: int = -1  # time since boot, ns
     readings: dict[str, float] = field(default_factory=dict)  # what it last said, for people: "airspeed, m/s": 21.3
     words: dict[str, str] = field(default_factory=dict)  # and in words: "landed": "on ground"
-    recent: deque[tuple[int, int, int, bytes]] = field(default_factory=lambda: deque(maxlen=512))
+    told: dict[tuple[int, int, bytes], int] = field(default_factory=dict)  # (component, message, time): its source
+    tellers: dict[tuple[int, int], tuple[int, int]] = field(default_factory=dict)  # (component, message): source, stamp
 
-    def is_echo(self, frame: tuple[int, int, int, bytes]) -> bool:
-        """Whether this frame was heard already, over another link. Remembers it."""
-        if len(self.sources) < 2:
-            return False
-        if frame in self.recent:
-            return True
-        self.recent.append(frame)
-        return False
+    def is_told(self, source: int, frame: Frame, size: int) -> bool:
+        """Whether another link has told what was so at this frame's time, its payload's first `size` bytes."""
+        key = (frame.component, frame.message, frame.payload[:size])
+        teller = self.told.setdefault(key, source)
+        if len(self.told) > _TIMES:
+            del self.told[next(iter(self.told))]
+        return teller != source
 
 
 @dataclass(slots=True)
@@ -66,20 +77,30 @@ class Component:
 
     key: tuple[int, int, int]
     is_vehicle: bool
-    clock: SourceClock = field(default_factory=SourceClock)
+    role: str
+    clock: SourceClock
     sequence: SequenceCheck = field(default_factory=SequenceCheck)
+    rates: Rates = field(default_factory=Rates)
     reboots_told: int = 0
     is_named_foreign: bool = False
+    linked_to: Vehicle | None = None  # whose other links' clocks this one knows
+
+    def take_role(self, kind: int, autopilot: int) -> None:
+        """What a HEARTBEAT says that this component is; it may change."""
+        self.is_vehicle = is_vehicle(kind, autopilot)
+        self.role = by_heartbeat(kind, autopilot, self.key[2])
 
 
 @dataclass(slots=True)
 class _Member:
-    """One system number on one source."""
+    """One system number on one source. Its motion is followed only while it is compared with another source's."""
 
+    source: int
+    system: int
     vehicle: Vehicle | None = None
-    tried: int = 0
-    since: int = 0
+    trace: Trace | None = None
     recent: deque[tuple[int, bytes]] = field(default_factory=lambda: deque(maxlen=_REMEMBERED))
+    likenesses: dict[int, Likeness] = field(default_factory=dict)  # with the members on these sources
 
 
 @dataclass(slots=True)
@@ -89,7 +110,7 @@ class Registry:
     origins: dict[int, str]
     notes: list[tuple[str, str]]
     components: dict[tuple[int, int, int], Component] = field(default_factory=dict)
-    _members: dict[tuple[int, int], _Member] = field(default_factory=dict)
+    _members: dict[int, dict[int, _Member]] = field(default_factory=dict)  # by system, then by source
     _vehicles: dict[int, list[Vehicle]] = field(default_factory=dict)
 
     def component(self, source: int, system: int, component: int) -> Component:
@@ -97,77 +118,167 @@ class Registry:
         key = (source, system, component)
         known = self.components.get(key)
         if known is None:
-            known = self.components[key] = Component(key, is_vehicle=component == 1)
+            clock = SourceClock(key)
+            known = self.components[key] = Component(key, component == 1, by_number(component), clock)
         return known
 
-    def vehicle(
-        self, source: int, system: int, evidence: tuple[int, bytes] | None, received_at: int, counters: Counter[str]
-    ) -> Vehicle | None:
-        """The vehicle of this number on this source; None as long as it is undecided which one it is.
-
-        `evidence`: message id and payload of a frame that two vehicles would not send alike.
-        """
-        member = self._members.get((source, system))
-        if member is None:
-            member = self._members[source, system] = _Member(since=received_at)
-        if evidence is not None:
-            member.recent.append(evidence)
-        vehicle = member.vehicle
-        if vehicle is None:
-            vehicle = member.vehicle = self._decide(source, system, member, evidence, received_at, counters)
-            if vehicle is None:
-                return None
-            joins = bool(vehicle.sources) and received_at - vehicle.last_heard < _ALIVE_NS
-            vehicle.sources.add(source)
-            if joins:  # what told them to be one was heard on the other link
-                return None
-        vehicle.last_heard = received_at
-        return vehicle
+    def vehicles(self) -> list[Vehicle]:
+        """All vehicles, in the order of their numbers."""
+        return [vehicle for system in sorted(self._vehicles) for vehicle in self._vehicles[system]]
 
     def of_number(self, source: int, system: int) -> Vehicle | None:
         """The vehicle of a number: on this source, else the first of that number anywhere; None when there is none."""
-        member = self._members.get((source, system))
+        member = self._members.get(system, {}).get(source)
         if member is not None and member.vehicle is not None:
             return member.vehicle
         return next(iter(self._vehicles.get(system, ())), None)
 
-    def _decide(
-        self,
-        source: int,
-        system: int,
-        member: _Member,
-        evidence: tuple[int, bytes] | None,
-        received_at: int,
-        counters: Counter[str],
-    ) -> Vehicle | None:
-        known = self._vehicles.get(system)
+    def hear(self, component: Component, frame: Frame, received_at: int, counters: Counter[str]) -> Vehicle | None:
+        """The vehicle that a frame of a vehicle's component tells of; None where that is undecided, or was heard already."""
+        source, system, _ = component.key
+        members = self._members.setdefault(system, {})
+        member = members.get(source)
+        if member is None:
+            member = members[source] = _Member(source, system)
+            self._follow(members, received_at)
+        if member.trace is not None:
+            self._compare(member, frame, received_at, counters)
+        vehicle = member.vehicle
+        if vehicle is None:
+            vehicle = self._decide(member, received_at, counters)
+            if vehicle is None:
+                counters["undecided"] += 1
+                return None
+            joins = bool(vehicle.sources) and received_at - vehicle.last_heard < _ALIVE_NS
+            member.vehicle = vehicle
+            vehicle.sources.add(source)
+            self._follow(members, received_at)
+            if joins:
+                counters["undecided"] += 1
+                return None  # what told them to be one was heard on the other link
+        vehicle.last_heard = received_at
+        if len(vehicle.sources) > 1 and self._is_echo(component, vehicle, frame, received_at):
+            counters["heard twice"] += 1
+            return None
+        return vehicle
+
+    def _follow(self, members: dict[int, _Member], received_at: int) -> None:
+        """Follow the motion of those that are, or may be, one vehicle over several sources, and of no others."""
+        open_question = len(members) > 1 and any(member.vehicle is None for member in members.values())
+        for member in members.values():
+            shared = member.vehicle is not None and len(member.vehicle.sources) > 1
+            if not open_question and not shared:
+                member.trace = None
+                member.recent.clear()
+                member.likenesses.clear()
+            elif member.trace is None:
+                member.trace = Trace(received_at)
+
+    def _compare(self, member: _Member, frame: Frame, received_at: int, counters: Counter[str]) -> None:
+        """Take a frame in as evidence of who this is; two that have parted become two."""
+        trace = member.trace
+        assert trace is not None
+        if frame.message == SYSTEM_TIME:
+            unix_usec, boot_ms = _UTC.unpack(frame.payload[:12].ljust(12, b"\0"))
+            if unix_usec:
+                trace.hear_utc(unix_usec * 1000, boot_ms)
+        if frame.message not in (ATTITUDE, GLOBAL_POSITION_INT):
+            return
+        trace.hear(frame.message, frame.payload, received_at)
+        if frame.message == ATTITUDE or frame.payload[4:12].strip(b"\0"):  # positions of all zeros two would send alike
+            member.recent.append((frame.message, frame.payload))
+        vehicle = member.vehicle
+        for likeness in member.likenesses.values():
+            likeness.compare()
+            if vehicle is not None and likeness.have_parted():
+                self._part(member, vehicle, counters)
+                return
+
+    def _decide(self, member: _Member, received_at: int, counters: Counter[str]) -> Vehicle | None:
+        known = self._vehicles.get(member.system)
         if not known:
-            return self._new(system, counters)
+            return self._new(member.system, counters)
         alive = [vehicle for vehicle in known if received_at - vehicle.last_heard < _ALIVE_NS]
         if not alive:
             return max(known, key=lambda vehicle: vehicle.last_heard)
-        same = self._same(system, member, alive)
-        if same is not None:
-            return same
-        member.tried += evidence is not None
-        if member.tried < _TRIALS or received_at - member.since < _TRIAL_NS:
+        said = set(member.recent)
+        verdicts = []
+        for vehicle in alive:
+            for source in sorted(vehicle.sources):
+                there = self._members[member.system][source]
+                verdict = True if not said.isdisjoint(there.recent) else self._verdict(member, there, received_at)
+                if verdict:
+                    return vehicle
+                verdicts.append(verdict)
+        if None in verdicts:
             return None
-        other = self._new(system, counters)
+        other = self._new(member.system, counters)
         there = ", ".join(self.origins[number] for number in sorted(alive[0].sources))
-        text = f"Two vehicles say that they are system {system}: {alive[0].name} on {there}, "
-        text += f"{other.name} on {self.origins[source]}."
+        text = f"Two vehicles say that they are system {member.system}: {alive[0].name} on {there}, "
+        text += f"{other.name} on {self.origins[member.source]}."
         self.notes.append(("warning", text))
         return other
 
-    def _same(self, system: int, member: _Member, alive: list[Vehicle]) -> Vehicle | None:
-        """The living vehicle that has said something of what this member says."""
-        said = set(member.recent)
-        for vehicle in alive:
-            for source in sorted(vehicle.sources):
-                there = self._members[source, system]
-                if not said.isdisjoint(there.recent):
-                    return vehicle
-        return None
+    def _verdict(self, member: _Member, there: _Member, received_at: int) -> bool | None:
+        if member.trace is None or there.trace is None:
+            return None
+        likeness = member.likenesses.get(there.source)
+        if likeness is None:
+            likeness = member.likenesses[there.source] = Likeness(member.trace, there.trace)
+        return likeness.verdict(received_at)
+
+    def _part(self, member: _Member, vehicle: Vehicle, counters: Counter[str]) -> None:
+        other = self._new(member.system, counters)
+        text = f"{vehicle.name} was heard over several links, but on {self.origins[member.source]} it is "
+        text += f"elsewhere: that is another vehicle of the same number, {other.name} from now on."
+        self.notes.append(("warning", text))
+        vehicle.sources.discard(member.source)
+        other.sources.add(member.source)
+        member.vehicle = other
+        for key, component in self.components.items():
+            if key[0] == member.source and key[1] == member.system:
+                for sibling in component.clock.siblings:
+                    sibling.siblings.remove(component.clock)
+                component.clock.siblings.clear()
+                component.linked_to = None
+        self._follow(self._members[member.system], 0)
+
+    def _is_echo(self, component: Component, vehicle: Vehicle, frame: Frame, received_at: int) -> bool:
+        """Whether what a frame of a vehicle over several links tells has been told over another, or is told better there."""
+        source = component.key[0]
+        if component.linked_to is not vehicle:
+            self._link(component, vehicle)
+        if frame.message == SYSTEM_TIME:
+            return False  # each link's clock is its own
+        size = _TIMED.get(frame.message)
+        if size is not None:
+            return vehicle.is_told(source, frame, size)
+        key = (frame.component, frame.message)
+        teller = vehicle.tellers.get(key)
+        if teller is not None and teller[0] != source and received_at - teller[1] < _TELLS_NS:
+            members = self._members[component.key[1]]
+            mine, there = members[source].trace, members[teller[0]].trace
+            if mine is None or there is None or mine.least is None or there.least is None or mine.least >= there.least:
+                return True
+        vehicle.tellers[key] = (source, received_at)
+        return False
+
+    def _link(self, component: Component, vehicle: Vehicle) -> None:
+        """Let the clocks of one component over several links know of one another."""
+        _, system, number = component.key
+        component.linked_to = vehicle
+        for source in sorted(vehicle.sources - {component.key[0]}):
+            other = self.components.get((source, system, number))
+            if other is not None and all(known is not other.clock for known in component.clock.siblings):
+                component.clock.siblings.append(other.clock)
+                other.clock.siblings.append(component.clock)
+        members = self._members[system]
+        member = members[component.key[0]]
+        for source in vehicle.sources - {member.source}:
+            there = members[source]
+            paired = source in member.likenesses or member.source in there.likenesses
+            if member.trace is not None and there.trace is not None and not paired:
+                member.likenesses[source] = Likeness(member.trace, there.trace)
 
     def _new(self, system: int, counters: Counter[str]) -> Vehicle:
         of_number = self._vehicles.setdefault(system, [])
