@@ -13,6 +13,7 @@ what came of it is said. A vehicle that has rebooted has forgotten, and is asked
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -157,8 +158,8 @@ class RateClient:
 
     def _conclude(self, now: int) -> None:
         """Enough was listened: ask for what is missing, or say what came of it."""
-        rates, slack = self._rates(now)
-        missing = [one for one in WANTED if rates[one] + slack < one.enough_hz]
+        rates, at_most = self._rates(now)
+        missing = [one for one in WANTED if at_most[one] < one.enough_hz]
         self.listens_since, self._tries, self._due_at = None, 0, now
         if not self._has_asked:
             self._has_asked = True
@@ -171,12 +172,21 @@ class RateClient:
         else:
             self._tell(rates)
 
-    def _rates(self, now: int) -> tuple[dict[Wanted, float], float]:
-        """How often each comes, with what the link lost counted in, and by how much a count of so few can be short, Hz."""
+    def _rates(self, now: int) -> tuple[dict[Wanted, float], dict[Wanted, float]]:
+        """How often each comes and how often it may come at most, Hz, with what the link lost counted in.
+
+        The second is what keeps a lossy link from lowering a rate: one message more than was counted, and three standard
+        deviations of how many of so few may be among the lost.
+        """
         heard = self._counts.total()
-        whole = (heard + self._lost) / heard if heard else 1.0
-        per_s = whole * SECOND / (now - (self.listens_since or 0))
-        return {one: self._counts[one.message] * per_s for one in WANTED}, per_s
+        per_s = (heard + self._lost) / max(heard, 1) * SECOND / (now - (self.listens_since or 0))
+        lost_share = self._lost / max(heard + self._lost, 1)
+        rates, at_most = {}, {}
+        for one in WANTED:
+            count = self._counts[one.message]
+            rates[one] = count * per_s
+            at_most[one] = (count + 1 + 3 * math.sqrt(count * lost_share)) * per_s if count else 0.0
+        return rates, at_most
 
     def _fall_back(self, now: int) -> None:
         """An autopilot from before SET_MESSAGE_INTERVAL."""

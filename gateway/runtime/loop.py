@@ -9,8 +9,9 @@ from adapters import Arrival
 from gateway.picture import Picture
 from gateway.runtime.allowed import Allowed
 from gateway.runtime.links import Link
+from gateway.runtime.manners import Manners
 from gateway.runtime.playback import Playback
-from gateway.runtime.receiver import Receiver
+from gateway.runtime.receiver import Delivery, Receiver
 from gateway.runtime.run import Run
 from gateway.runtime.setup import RunFailure, Setup
 from gateway.runtime.summary import Summary
@@ -44,10 +45,11 @@ def run_live(
     asked_to_stop: AskedToStop = _never,
     no_place_after_s: float = _NO_PLACE_AFTER_S,
     allowed: Allowed | None = None,
+    manners: Manners | None = None,
 ) -> Summary:
     """Fuse what open links bring until asked to stop, or for so many seconds; closes the links.
 
-    `allowed`: who may be heard; None: everybody.
+    `allowed`: who may be heard; None: everybody. `manners`: what may be sent on the MAVLink links; None: nothing.
 
     Raises RunFailure when the archive cannot be written, or the stream does not tell where we are.
     """
@@ -56,7 +58,7 @@ def run_live(
         run = Run(setup, receiver.started_at)
         with _Abandoning(run):
             receiver.start()
-            ended = _live(receiver, run, seconds, watch, asked_to_stop, no_place_after_s)
+            ended = _live(receiver, run, seconds, watch, asked_to_stop, no_place_after_s, manners)
             receiver.close()
             _tick(receiver, run, watch, idle_ns=0)
             return run.finish(ended)
@@ -71,12 +73,13 @@ def _live(
     watch: Watch,
     asked_to_stop: AskedToStop,
     no_place_after_s: float,
+    manners: Manners | None,
 ) -> str:
     """Tick until the end; how it ended."""
     began = time.monotonic()
     while True:
         tick_began = time.monotonic()
-        _tick(receiver, run, watch)
+        _tick(receiver, run, watch, manners=manners)
         if run.place is None and run.heard_for_s > no_place_after_s:
             raise RunFailure(
                 "Nothing that came in tells where the runway is (no HOME_POSITION, no mission, nobody standing still); "
@@ -89,16 +92,31 @@ def _live(
         time.sleep(max(0.0, TICK_S - (time.monotonic() - tick_began)))
 
 
-def _tick(receiver: Receiver, run: Run, watch: Watch, idle_ns: int = _IDLE_NS) -> None:
+def _tick(receiver: Receiver, run: Run, watch: Watch, idle_ns: int = _IDLE_NS, manners: Manners | None = None) -> None:
     """Work in what came; where nothing did, the watermark, if it has not been worked in for a while."""
     delivery = receiver.drain()
-    is_idle = not (delivery.arrivals or delivery.sources or delivery.notes)
+    notes = delivery.notes
+    if manners is not None:
+        notes = (*notes, *_speak(receiver, delivery, manners))
+    is_idle = not (delivery.arrivals or delivery.sources or notes)
     if is_idle and delivery.watermark - run.watermark < idle_ns:
         return
     for source in delivery.sources:
         run.add(source)
-    run.count(receiver.counters())
-    watch(run, run.work(delivery.arrivals, delivery.watermark, delivery.notes))
+    run.count(receiver.counters() if manners is None else receiver.counters() | manners.counters)
+    watch(run, run.work(delivery.arrivals, delivery.watermark, notes))
+
+
+def _speak(receiver: Receiver, delivery: Delivery, manners: Manners) -> list[tuple[str, str]]:
+    """Send what is due after what came; what there is to tell of it."""
+    for source in delivery.sources:
+        manners.add(source)
+    manners.hear(delivery.arrivals)
+    for number, frame in manners.due(delivery.watermark):
+        receiver.send(number, frame)
+    notes = list(manners.notes)
+    manners.notes.clear()
+    return notes
 
 
 def run_replay(
