@@ -10,6 +10,7 @@ from gateway.picture import Picture
 from gateway.runtime.allowed import Allowed
 from gateway.runtime.links import Link
 from gateway.runtime.manners import Manners
+from gateway.runtime.pace import Pace
 from gateway.runtime.playback import Playback
 from gateway.runtime.receiver import Delivery, Receiver
 from gateway.runtime.run import Run
@@ -60,7 +61,7 @@ def run_live(
             receiver.start()
             ended = _live(receiver, run, seconds, watch, asked_to_stop, no_place_after_s, manners)
             receiver.close()
-            _tick(receiver, run, watch, idle_ns=0)
+            _tick(receiver, run, watch, manners, is_last=True)
             return run.finish(ended)
     finally:
         receiver.close()
@@ -79,7 +80,7 @@ def _live(
     began = time.monotonic()
     while True:
         tick_began = time.monotonic()
-        _tick(receiver, run, watch, manners=manners)
+        _tick(receiver, run, watch, manners)
         if run.place is None and run.heard_for_s > no_place_after_s:
             raise RunFailure(
                 "Nothing that came in tells where the runway is (no HOME_POSITION, no mission, nobody standing still); "
@@ -92,14 +93,14 @@ def _live(
         time.sleep(max(0.0, TICK_S - (time.monotonic() - tick_began)))
 
 
-def _tick(receiver: Receiver, run: Run, watch: Watch, idle_ns: int = _IDLE_NS, manners: Manners | None = None) -> None:
+def _tick(receiver: Receiver, run: Run, watch: Watch, manners: Manners | None, *, is_last: bool = False) -> None:
     """Work in what came; where nothing did, the watermark, if it has not been worked in for a while."""
     delivery = receiver.drain()
     notes = delivery.notes
-    if manners is not None:
+    if manners is not None and not is_last:
         notes = (*notes, *_speak(receiver, delivery, manners))
     is_idle = not (delivery.arrivals or delivery.sources or notes)
-    if is_idle and delivery.watermark - run.watermark < idle_ns:
+    if is_idle and not is_last and delivery.watermark - run.watermark < _IDLE_NS:
         return
     for source in delivery.sources:
         run.add(source)
@@ -138,10 +139,11 @@ def run_replay(
     with _Abandoning(run):
         for source in playback.sources:
             run.add(source)
-        began, ended = time.monotonic(), "done"
+        pace, ended = Pace(speed, asked_to_stop), "done"
+        paced_from = setup.options.begins_at or playback.started_at  # what comes before is not waited for
         for arrivals, watermark in steps(playback.arrivals(), playback.started_at, step_ns, idle=speed is not None):
-            if speed is not None:
-                _wait_until(began + (watermark - playback.started_at) / 1e9 / speed, asked_to_stop)
+            if speed is not None and watermark >= paced_from:
+                pace.wait(watermark)
             if asker := asked_to_stop():
                 ended = f"stopped by {asker}"
                 break
@@ -180,12 +182,6 @@ def steps(
         gathered.append(arrival)
     if gathered:
         yield gathered, gathered[-1].received_at
-
-
-def _wait_until(monotonic_s: float, asked_to_stop: AskedToStop) -> None:
-    """Sleep, but not past a request to stop by more than a moment."""
-    while (left := monotonic_s - time.monotonic()) > 0 and not asked_to_stop():
-        time.sleep(min(left, 0.1))
 
 
 class _Abandoning:

@@ -35,8 +35,8 @@ from adapters.mission_client import (
     tells_of_a_change,
 )
 from adapters.rate_client import COMMAND_ACK, RateClient, read_ack
+from adapters.roles import INVALID_AUTOPILOT, is_vehicle
 from adapters.signing import Signer, SigningGuard
-from adapters.vehicles import INVALID_AUTOPILOT, STATIONS
 
 COMPONENT = 190  # MAV_COMP_ID_MISSIONPLANNER
 SYSTEMS = tuple(range(254, 244, -1))
@@ -189,7 +189,7 @@ class Manners:
             self._hear_mission(frame, vehicle, now)
         elif message == HEARTBEAT:
             kind, autopilot = _read_heartbeat(frame.payload)
-            if vehicle is None and autopilot != INVALID_AUTOPILOT and kind not in STATIONS:
+            if vehicle is None and is_vehicle(kind, autopilot):
                 self._meet(sender, now)
         elif vehicle is None:
             return
