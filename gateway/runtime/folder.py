@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from adapters import Kind, Source
-from gateway.settings import Options
+from gateway.settings import Mute, Options
 
 SESSION_FILE = "session.json"
 INPUTS = "inputs"
@@ -154,6 +154,7 @@ def _input_file(row: dict[str, Any]) -> InputFile:
 def read_options(stored: Mapping[str, Any]) -> Options:
     """Options as they were archived; those that this version does not know are an error of its reader's, not silent."""
     values = {key: tuple(value) if isinstance(value, list) else value for key, value in stored.items()}
+    values["mutes"] = tuple(Mute(**mute) for mute in values.get("mutes", ()))
     return replace(Options(), **cast("dict[str, Any]", values))
 
 

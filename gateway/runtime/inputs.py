@@ -22,6 +22,7 @@ class SessionInput:
     source: Source
     counters: Counter[str] = field(default_factory=Counter)
     sources: tuple[Source, ...] = field(init=False)
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         self.sources = (self.source,)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from adapters import Arrival, Source
 from adapters.decode import Decoder
@@ -56,8 +57,31 @@ class PlaceFinder:
 
     def search(self, sources: Iterable[Source], arrivals: Iterable[Arrival]) -> Place | None:
         """The place that a whole recording tells of."""
-        decoder = Decoder(tuple(sources))
-        for arrival in arrivals:
-            for observation in decoder.feed(arrival).observations:
-                self.gather(observation)
-        return self.place(complete=True)
+        return look_over(sources, arrivals).place
+
+
+@dataclass(frozen=True, slots=True)
+class Overview:
+    """What a whole recording tells before it is replayed."""
+
+    place: Place | None
+    vehicles: tuple[str, ...]  # in the order they were heard
+    extents: Mapping[int, tuple[int, int]]  # the first and last stamp of each source that says anything
+    epoch_offset_s: int
+
+
+def look_over(sources: Iterable[Source], arrivals: Iterable[Arrival]) -> Overview:
+    """One reading of a whole recording."""
+    decoder, finder = Decoder(tuple(sources)), PlaceFinder()
+    vehicles: dict[str, None] = {}
+    extents: dict[int, tuple[int, int]] = {}
+    for arrival in arrivals:
+        stamp, source = arrival.received_at, arrival.source
+        extents[source] = (extents[source][0] if source in extents else stamp, stamp)
+        heard = decoder.feed(arrival)
+        for observation in () if heard is None else heard.observations:
+            finder.gather(observation)
+            if isinstance(observation, VehicleStatus):
+                vehicles.setdefault(observation.aircraft)
+    place = finder.place(complete=True)
+    return Overview(place, tuple(vehicles), extents, decoder.epoch_offset_s or 0)

@@ -9,17 +9,21 @@ import heapq
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import count
 from operator import attrgetter
 from pathlib import Path
 from typing import Protocol
 
 from adapters import Arrival, Source
 from adapters.files import FileError, kind_of, open_recording
+from adapters.tlog import STEP_NS
 from gateway.runtime.folder import InputFile, read_record
 from gateway.runtime.inputs import SessionInput
-from gateway.runtime.places import PlaceFinder
+from gateway.runtime.places import Overview, look_over
+from gateway.runtime.seeking import SECOND, Span
 from gateway.runtime.sessions import mend
 from gateway.runtime.setup import Place
+from gateway.runtime.told_plans import Missions, ToldInput, told_plan, told_source, whose
 from gateway.settings import Options, SiteError, parse_site
 
 _BYTES_A_RECORD = 8  # of a .tlog beside the frame; a capture has more, which only makes the progress a little early
@@ -31,6 +35,7 @@ class Readable(Protocol):
     path: Path
     counters: Counter[str]
     sources: tuple[Source, ...]
+    notes: tuple[str, ...]
 
     def arrivals(self) -> Iterator[Arrival]:
         """Every arrival, stamps increasing."""
@@ -50,6 +55,7 @@ class Playback:
     place: Place | None = None
     options: Options = field(default_factory=Options)
     _read_bytes: int = 0
+    _overview: Overview | None = None
 
     @property
     def sources(self) -> tuple[Source, ...]:
@@ -77,25 +83,65 @@ class Playback:
         counted = {f"{file.path.name}: {why}": number for file in self.files for why, number in file.counters.items()}
         return {reason: number for reason, number in sorted(counted.items()) if number}
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a person should know of the files before they are replayed."""
+        return tuple(note for file in self.files for note in file.notes) + self._apart()
+
+    def overview(self) -> Overview:
+        """What all of it tells; read once, when it is first asked for."""
+        if self._overview is None:
+            self._overview = look_over(self.sources, self.arrivals())
+        return self._overview
+
     def find_place(self) -> Place | None:
         """The place that the recordings tell of when all of them is known, or None."""
-        return PlaceFinder().search(self.sources, self.arrivals())
+        return self.overview().place
+
+    def span(self) -> Span:
+        """From when to when it goes."""
+        found = self.overview()
+        last = max(last for _, last in found.extents.values()) if self.watermark is None else self.watermark
+        return Span(self.started_at, last, found.epoch_offset_s * SECOND)
+
+    def _apart(self) -> tuple[str, ...]:
+        """Which files begin after all others have ended: their clocks may differ, and nobody shifts them."""
+        if len(self.files) < 2 or self.watermark is not None:
+            return ()
+        extents = self.overview().extents
+        spans = []
+        for file in self.files:
+            heard = [extents[one.number] for one in file.sources if one.kind != "told" and one.number in extents]
+            if heard:
+                spans.append((min(first for first, _ in heard), max(last for _, last in heard), file.path))
+        spans.sort()
+        notes, ended = [], spans[0][1]
+        for began, last, path in spans[1:]:
+            if began > ended:
+                gap_s = (began - ended) / SECOND
+                notes.append(
+                    f"{path} begins {gap_s:.0f} s after the others have ended: nothing is shifted to join them."
+                )
+            ended = max(ended, last)
+        return tuple(notes)
 
 
 _order = attrgetter("received_at", "source")
 
 
-def open_playback(paths: Sequence[Path]) -> Playback:
-    """Recordings, or one archived session (completed first, if it was killed).
+def open_playback(paths: Sequence[Path], plans: Missions = ()) -> Playback:
+    """Recordings with mission files among them or as `plans`, or one archived session (completed first, if killed).
 
     Raises FileError or FolderError, one sentence, for what cannot be replayed.
     """
-    folders = [path for path in paths if kind_of(path) == "session"]
-    if not folders:
-        return _of_files(paths)
-    if len(paths) > 1:
+    kinds = {path: kind_of(path) for path in paths}
+    if "session" not in kinds.values():
+        missions = [(None, path) for path in paths if kinds[path] in ("plan", "waypoints")]
+        recordings = [path for path in paths if kinds[path] not in ("plan", "waypoints")]
+        return _of_files(recordings, (*missions, *plans))
+    if len(paths) > 1 or plans:
         raise FileError("A session is replayed alone: name one folder, or files.")
-    return _of_session(folders[0])
+    return _of_session(paths[0])
 
 
 def _of_session(folder: Path) -> Playback:
@@ -118,7 +164,9 @@ def _input(folder: Path, described: InputFile) -> SessionInput:
     return SessionInput(path, described.source)
 
 
-def _of_files(paths: Sequence[Path]) -> Playback:
+def _of_files(paths: Sequence[Path], missions: Missions) -> Playback:
+    if not paths:
+        raise FileError("A mission file is told along with a recording: name that too.")
     files: list[Readable] = []
     number = 0
     for path in paths:
@@ -128,7 +176,15 @@ def _of_files(paths: Sequence[Path]) -> Playback:
     playback = Playback(tuple(files), 0)
     _name_apart(files)
     first = next(playback.arrivals())  # raises FileError when there is none
-    return replace(playback, started_at=first.received_at)
+    playback.started_at = first.received_at
+    if not missions:
+        return playback
+    vehicles = playback.overview().vehicles if any(aircraft is None for aircraft, _ in missions) else ()
+    stamps = count(first.received_at, STEP_NS)
+    told = tuple(told_plan(path, aircraft, number, next(stamps)) for aircraft, path in whose(missions, vehicles))
+    files.append(ToldInput(missions[0][1], (told_source(number, missions),), told))
+    _name_apart(files)
+    return Playback(tuple(files), playback.started_at)
 
 
 def _name_apart(files: Sequence[Readable]) -> None:

@@ -18,6 +18,8 @@ from gateway.observation import Heard
 from gateway.picture import Picture
 from gateway.pipeline import State, initial, step
 from gateway.runtime.folder import Record, make_folder, session_name
+from gateway.runtime.mutes import Muting
+from gateway.runtime.opening import Opening
 from gateway.runtime.outputs import Outputs
 from gateway.runtime.places import PlaceFinder
 from gateway.runtime.recorder import Recorder
@@ -47,6 +49,10 @@ class Run:
         self._tally: Tally | None = None
         self._held: list[Heard] = []
         self._finder = PlaceFinder()
+        self._untold: tuple[tuple[str, str], ...] = ()  # notes for the next step
+        begins_at = setup.options.begins_at
+        self._opening = None if begins_at is None else Opening(begins_at)
+        self._muting = Muting(setup.options.mutes)
         self._recorder: Recorder | None = None
         self._link_counters: dict[str, int] = {}
         if setup.archive is not None:
@@ -111,43 +117,73 @@ class Run:
 
         `notes` are (level, text) of the links, to be told once.
         """
-        heard = [decoded for arrival in arrivals if (decoded := self._take(arrival)) is not None]
+        heard = self._hear(arrivals)
         self._watermark = max(self._watermark, watermark)
         mark = self._decoder.watermark(self._watermark)
-        heard.append(replace(mark, notes=(*mark.notes, *notes)) if notes else mark)
-        if self._state is not None:
-            return self._step(heard)
-        self._hold(heard)
-        if self.place is None:
+        heard.append(mark if not notes else replace(mark, notes=(*mark.notes, *notes)))
+        if self._opening is not None:
+            heard = self._before(heard, self._opening)
+        if self._state is None:
+            self._held += heard
+            self._look(heard)
+            heard, self._held = ([], self._held) if self._state is None else (self._held, [])
+        if not heard:
             self._flush_when_due()
             return None
-        held, self._held = self._held, []
-        note = ("info", f"Site: {self.place.origin}.")
-        return self._step([*held[:-1], replace(held[-1], notes=(*held[-1].notes, note))])
+        if self._untold:
+            heard[-1] = replace(heard[-1], notes=(*heard[-1].notes, *self._untold))
+            self._untold = ()
+        return self._step(heard)
 
-    def _take(self, arrival: Arrival) -> Heard | None:
-        """Record and decode one arrival; None when it holds nothing for the picture."""
-        if self._first_at is None:
-            self._first_at = arrival.received_at
-        self._arrivals[arrival.source] += 1
-        if self.outputs is not None and self.outputs.is_our_own(arrival.data):
-            if self._recorder is not None:
-                self._recorder.refuse(arrival)
-            return None
-        decoded = self._decoder.feed(arrival)
-        if self._recorder is not None:
-            if self._decoder.refused:
-                self._recorder.refuse(arrival)
-            else:
-                self._recorder.keep(arrival)
-        return decoded if decoded.observations or decoded.notes else None
+    def _hear(self, arrivals: Sequence[Arrival]) -> list[Heard]:
+        """Record and decode; what holds something for the picture."""
+        hear, counted, recorder = self._decoder.feed, self._arrivals, self._recorder
+        if self._first_at is None and arrivals:
+            self._first_at = arrivals[0].received_at
+        heard: list[Heard] = []
+        for arrival in arrivals:
+            if self._opening is not None and arrival.received_at >= self._opening.begins_at:
+                heard = self._open(heard, self._opening)
+            counted[arrival.source] += 1
+            decoded: Heard | None = hear(arrival)
+            if recorder is not None:
+                if self._decoder.refused is None:
+                    recorder.keep(arrival)
+                else:
+                    recorder.refuse(arrival)
+            if decoded is None or not (decoded.observations or decoded.notes):
+                continue
+            if decoded is not None and self.setup.options.mutes:
+                decoded = self._muting.without_muted(decoded, arrival.received_at)
+            if decoded is not None:
+                heard.append(decoded)
+        return heard
 
-    def _hold(self, heard: list[Heard]) -> None:
-        """Keep what came until it tells where we are."""
-        self._held += heard
+    def _before(self, heard: list[Heard], opening: Opening) -> list[Heard]:
+        """Nothing has come yet from the session's beginning on: keep what will hold then, unless time has come to it."""
+        if self._watermark >= opening.begins_at:
+            return [*self._open(heard[:-1], opening), heard[-1]]
+        for item in heard:
+            opening.keep(item)
+        if self._state is None:
+            self._look(heard)
+        return []
+
+    def _open(self, before: list[Heard], opening: Opening) -> list[Heard]:
+        """The session begins: what was said before and still holds."""
+        for item in before:
+            opening.keep(item)
+        if self._state is None:
+            self._look(before)
+        self._opening = None
+        return [opening.deliver(self._decoder.session_time(opening.begins_at))]
+
+    def _look(self, heard: list[Heard]) -> None:
+        """See whether what was heard tells where we are."""
         place = self._finder.look(heard)
         if place is not None:
             self._settle(place)
+            self._untold = (*self._untold, ("info", f"Site: {place.origin}."))
 
     def _step(self, heard: Sequence[Heard]) -> Picture:
         assert self._state is not None
@@ -221,7 +257,7 @@ class Run:
 
     def _summary(self, ended: str) -> Summary:
         tally = self._tally
-        began = self.started_at if self._first_at is None else self._first_at
+        began = max(self.started_at if self._first_at is None else self._first_at, self.setup.options.begins_at or 0)
         rows = tuple(
             {"number": source.number, "kind": source.kind, "name": source.name, "origin": source.origin}
             | {"arrivals": self._arrivals[source.number]}
@@ -229,7 +265,7 @@ class Run:
         )
         return Summary(
             ended=ended,
-            duration_s=(self._watermark - began) / 1e9,
+            duration_s=max(self._watermark - began, 0) / 1e9,
             wall_s=(time.monotonic_ns() - self._wall_began) / 1e9,
             site=self.place.site.name if self.place else "",
             site_origin=self.place.origin if self.place else "",

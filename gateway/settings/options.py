@@ -7,6 +7,7 @@ from typing import Literal
 
 Weighting = Literal["bias", "covariance", "innovation", "literal"]
 AssociationRule = Literal["default", "literal"]
+MutedSource = Literal["gps", "radar"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +18,7 @@ class Mute:
     Times are receiver's stamps, ns since 1970 UTC.
     """
 
-    what: Literal["gps", "radar"]
+    what: MutedSource
     number: int | None
     since: int
     until: int
