@@ -1,5 +1,7 @@
 """The receiving side of the landing-radar wire: windows, keys, senders."""
 
+import zlib
+
 from adapters.landing_radar import Header, Plot, encode
 from adapters.radar import LandingRadarReceiver, Taken
 
@@ -131,3 +133,27 @@ def test_a_sender_that_took_over_after_silence_is_no_second_one() -> None:
     _hear(receiver, _datagram(1), sender="10.0.0.1:5", now=START)
     _hear(receiver, _datagram(1), sender="10.0.0.1:6", now=START + 11 * SECOND)
     assert receiver.counters["second sender"] == 0
+
+
+def test_with_a_key_each_kind_of_forgery_is_refused_and_counted() -> None:
+    """Unsigned, signed with another key, sent before, sent long before, dated ahead; the right one is still taken."""
+    receiver = LandingRadarReceiver({1: KEY}, live=True)
+    right = _datagram(1, at=START, key=KEY)
+    assert _hear(receiver, _datagram(1, at=START)) == "tag"
+    assert _hear(receiver, _datagram(1, at=START, key=b"another key")) == "tag"
+    assert _hear(receiver, right) == "taken"
+    assert _hear(receiver, right, sender="someone else") == "replayed"
+    assert _hear(receiver, _datagram(2, at=START - 11 * SECOND, key=KEY)) == "replayed"
+    assert _hear(receiver, _datagram(3, at=START + 11 * SECOND, key=KEY)) == "replayed"
+    assert receiver.counters == {"tag": 2, "datagrams": 1, "replayed": 3, "lost": 0}
+    assert _hear(receiver, _datagram(2, at=START + SECOND, key=KEY)) == "taken"
+
+
+def test_with_a_key_any_byte_changed_is_refused() -> None:
+    """Also where the checksum was made right again. Bytes 4 and 5 are the radar's number: another radar has no key here."""
+    data = _datagram(1, at=START, key=KEY)
+    for place in range(len(data) - 4):
+        changed = bytearray(data[:-4])
+        changed[place] ^= 1
+        again = bytes(changed) + zlib.crc32(bytes(changed)).to_bytes(4, "big")
+        assert _hear(LandingRadarReceiver({1: KEY}), again) != "taken" or place in (4, 5), place
