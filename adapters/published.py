@@ -3,7 +3,8 @@
     ICAO_address   the aircraft's own where it is known, else one that we make up: 0xB00000 and the track's number
     lat, lon       degE7
     altitude       mm above mean sea level, as the definition says ("ASL") and as ground stations and autopilots take it,
-                   type 1 (geometric); type 0 (pressure) where only a pressure altitude is known
+                   type 1 (geometric); type 0 (pressure) where only a pressure altitude is known. (What receivers hand
+                   on under type 1 is what aircraft say, which is above the ellipsoid: traffic.py reads it so.)
     heading        course over ground, cdeg, below 36000; invalid below 1 m/s, where a course means nothing
     hor_velocity   cm/s; ver_velocity cm/s, UP; both held at the ends of what fits
     callsign       8 characters and a zero
