@@ -96,6 +96,7 @@ class PlanBook:
     _expected: int | None = None
     _before: dict[int, PlanPoint] | None = None  # what it had when a station began to send it another
     _told: tuple[PlanPoint, ...] = ()
+    _intents: dict[str, tuple[float | None, ...] | None] = field(default_factory=dict)
 
     def hear(self, told: Overheard, *, by_vehicle: bool, begins_with_home: bool = True) -> bool:
         """One message of a transfer; whether the plan has changed and is whole (as far as its length is known)."""
@@ -134,6 +135,13 @@ class PlanBook:
         if above is None or self._home is None or self._home.altitude_msl_m is None:
             return point.altitude_msl_m
         return self._home.altitude_msl_m + above
+
+    def is_new_intent(self, told_by: str, goal: tuple[float | None, ...] | None) -> bool:
+        """Take in where the vehicle says that it goes (None = nowhere); whether that differs from what it said last."""
+        if self._intents.get(told_by) == goal:
+            return False
+        self._intents[told_by] = goal
+        return goal is not None
 
     def summary(self) -> str:
         """The plan in a few words, for people."""

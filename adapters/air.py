@@ -1,0 +1,129 @@
+"""What a vehicle says of the air that it flies in, as AirData. Winds there are where the air moves TO.
+
+    VFR_HUD (74)           airspeed, groundspeed, climb m/s; alt m above mean sea level; no time
+    SCALED_PRESSURE (29)   press_abs, press_diff hPa; temperature centidegrees C, of the pressure sensor
+    WIND (168)             ArduPilot: direction degrees, where it comes FROM; speed m/s; speed_z m/s, DOWN; no time
+    WIND_COV (231)         wind_x, wind_y, wind_z m/s: where it moves to, north, east, DOWN; NaN = not known
+
+A value that is no number, or that nothing in the air reaches, is left out and counted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+from adapters.mavlink_frames import fields
+from adapters.moments import Moments, Observations
+from adapters.vehicles import Component, Vehicle
+from gateway.observation import AirData
+
+VFR_HUD, _read_hud = fields("VFR_HUD", "airspeed", "groundspeed", "alt", "climb")
+SCALED_PRESSURE, _read_pressure = fields("SCALED_PRESSURE", "time_boot_ms", "press_abs", "press_diff", "temperature")
+WIND, _read_wind = fields("WIND", "direction", "speed", "speed_z")
+WIND_COV, _read_wind_components = fields("WIND_COV", "time_usec", "wind_x", "wind_y", "wind_z")
+
+_FASTEST_MPS = 1000.0
+_STRONGEST_MPS = 150.0
+_LOWEST_M, _HIGHEST_M = -10_000.0, 100_000.0
+_GREATEST_HPA = 2000.0
+_KELVIN_CENTIDEGREES = 27315
+
+
+def hud(
+    moments: Moments, component: Component, vehicle: Vehicle, payload: bytes, received_at: int, counters: Counter[str]
+) -> Observations:
+    """VFR_HUD."""
+    airspeed, groundspeed, altitude, climb = _read_hud(payload)
+    air = _within(airspeed, 0.0, _FASTEST_MPS, counters)
+    ground = _within(groundspeed, 0.0, _FASTEST_MPS, counters)
+    rate = _within(climb, -_FASTEST_MPS, _FASTEST_MPS, counters)
+    high = _within(altitude, _LOWEST_M, _HIGHEST_M, counters)
+    readings = vehicle.readings
+    if air is not None:
+        readings["airspeed, m/s"] = air
+    if ground is not None:
+        readings["ground speed, m/s"] = ground
+    if rate is not None:
+        readings["climb, m/s"] = rate
+    if high is not None:
+        readings["altitude, m"] = high
+    if air is None and ground is None and rate is None and high is None:
+        return ()
+    valid_at, _ = moments.at_receipt(component, received_at)
+    return (AirData(vehicle.name, valid_at, received_at, air, ground, rate, high),)
+
+
+def pressure(
+    moments: Moments, component: Component, vehicle: Vehicle, payload: bytes, received_at: int, counters: Counter[str]
+) -> Observations:
+    """SCALED_PRESSURE."""
+    boot_ms, absolute, differential, temperature = _read_pressure(payload)
+    static = _within(absolute, 1e-3, _GREATEST_HPA, counters)
+    pitot = _within(differential, -_GREATEST_HPA, _GREATEST_HPA, counters)
+    valid_at, _ = moments.near(component, boot_ms * 1000, received_at)
+    if static is not None:
+        vehicle.readings["static pressure, hPa"] = static
+    if pitot is not None:
+        vehicle.readings["differential pressure, hPa"] = pitot
+    vehicle.readings["pressure sensor, degrees C"] = temperature / 100
+    return (
+        AirData(
+            vehicle.name,
+            valid_at,
+            received_at,
+            static_pressure_pa=None if static is None else static * 100,
+            differential_pressure_pa=None if pitot is None else pitot * 100,
+            temperature_k=(temperature + _KELVIN_CENTIDEGREES) / 100,
+        ),
+    )
+
+
+def wind(
+    moments: Moments, component: Component, vehicle: Vehicle, payload: bytes, received_at: int, counters: Counter[str]
+) -> Observations:
+    """WIND."""
+    direction, speed, down = _read_wind(payload)
+    strength = _within(speed, 0.0, _STRONGEST_MPS, counters)
+    bearing = _within(direction, -360.0, 360.0, counters)
+    sink = _within(down, -_STRONGEST_MPS, _STRONGEST_MPS, counters)
+    if strength is None or bearing is None:
+        return ()
+    angle = math.radians(bearing)
+    valid_at, _ = moments.at_receipt(component, received_at)
+    towards = (-strength * math.sin(angle), -strength * math.cos(angle))
+    return (_wind(vehicle, valid_at, received_at, towards, sink),)
+
+
+def wind_components(
+    moments: Moments, component: Component, vehicle: Vehicle, payload: bytes, received_at: int, counters: Counter[str]
+) -> Observations:
+    """WIND_COV."""
+    usec, north, east, down = _read_wind_components(payload)
+    if math.isnan(north) or math.isnan(east):  # not known
+        return ()
+    along = _within(north, -_STRONGEST_MPS, _STRONGEST_MPS, counters)
+    across = _within(east, -_STRONGEST_MPS, _STRONGEST_MPS, counters)
+    sink = None if math.isnan(down) else _within(down, -_STRONGEST_MPS, _STRONGEST_MPS, counters)
+    if along is None or across is None:
+        return ()
+    valid_at, _ = moments.near(component, usec, received_at)
+    return (_wind(vehicle, valid_at, received_at, (across, along), sink),)
+
+
+def _wind(
+    vehicle: Vehicle, valid_at: int, received_at: int, towards: tuple[float, float], down: float | None
+) -> AirData:
+    east, north = towards
+    vehicle.readings["wind, m/s"] = math.hypot(east, north)
+    vehicle.readings["wind from, degrees"] = math.degrees(math.atan2(-east, -north)) % 360
+    up = None if down is None else -down
+    return AirData(vehicle.name, valid_at, received_at, wind_east_mps=east, wind_north_mps=north, wind_up_mps=up)
+
+
+def _within(value: float, least: float, greatest: float, counters: Counter[str]) -> float | None:
+    """The value, where it is a number in its range; else None, counted."""
+    if least <= value <= greatest:  # false for NaN, too
+        return value
+    counters["not a number" if math.isnan(value) else "air data out of range"] += 1
+    return None
