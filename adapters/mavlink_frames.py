@@ -25,6 +25,8 @@ from typing import Any, NamedTuple
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import all as dialect
 
+from adapters.sequences import SequenceCheck as SequenceCheck  # where others look for it
+
 V2, V1 = 0xFD, 0xFE
 _SIGNED = 0x01
 LONGEST = 280 + 13
@@ -198,49 +200,6 @@ class FrameScanner:
         else:
             self._held = data[at:]
         return frames
-
-
-@dataclass(slots=True)
-class SequenceCheck:
-    """The sequence numbers of one (link, system, component), modulo 256.
-
-    Counts "lost", "duplicate" (the same number and message again), "reordered", and "unsequenced" for a source whose
-    number never changes.
-    """
-
-    last: int = -1
-    message: int = -1
-    recent: int = 0  # bit d: the number `last - d` was seen
-    moved: bool = False
-
-    def hear(self, sequence: int, message: int, counters: Counter[str]) -> None:
-        """Take the next frame's number into account."""
-        ahead = (sequence - self.last) & 255
-        behind = 256 - ahead
-        if ahead == 1 and self.last >= 0:
-            self.recent = (self.recent << 1 | 1) & _RECENT
-            self.moved = True
-        elif self.last < 0:
-            self.recent = 1
-        elif ahead == 0:
-            if message == self.message:  # a radio's two status messages share their number
-                counters["duplicate" if self.moved else "unsequenced"] += 1
-        elif behind <= _REORDERED:
-            seen = self.recent >> behind & 1
-            counters["duplicate" if seen else "reordered"] += 1
-            if not seen:
-                self.recent |= 1 << behind
-                counters["lost"] -= 1
-            return
-        else:
-            counters["lost"] += ahead - 1
-            self.recent = (self.recent << ahead | 1) & _RECENT
-            self.moved = True
-        self.last, self.message = sequence, message
-
-
-_REORDERED = 56  # numbers ahead by 200 and more are late ones
-_RECENT = (1 << (_REORDERED + 1)) - 1
 
 
 def fields(name: str, *wanted: str) -> tuple[int, Callable[[bytes], tuple[Any, ...]]]:
