@@ -101,7 +101,7 @@ class Manners:
         self.notes: list[tuple[str, str]] = []
         self._heartbeat, self._request_rates, self._fetch_mission = heartbeat, request_rates, fetch_mission
         self._is_silent = not (heartbeat or request_rates or fetch_mission)
-        self._heeded = _HEEDED if request_rates or fetch_mission else frozenset()
+        self._heeded = _HEEDED if request_rates or fetch_mission else frozenset((HEARTBEAT,))
         self._signer = None if key is None else Signer(key)
         self._guard = None if key is None else SigningGuard(key, live=True)
         self._peers: dict[int, _Peer] = {}

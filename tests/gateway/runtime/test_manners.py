@@ -13,11 +13,12 @@ from hypothesis import strategies as st
 
 from adapters import Arrival, Source
 from adapters.mavlink_frames import parse
-from adapters.signing import Signer, SigningGuard
+from adapters.signing import Signer, SigningGuard, timestamp_at
 from gateway.runtime.manners import COMPONENT, Manners
 
 KEY = hashlib.sha256(b"correct horse").digest()
 SECOND = 10**9
+START = 1_790_000_000 * SECOND
 ALL_RATES = {0: 1.0, 33: 5.0, 24: 2.0, 30: 10.0, 74: 2.0, 2: 1.0, 245: 1.0}
 ASKED_IN_ORDER = [33, 24, 30, 74, 2, 245]
 
@@ -353,6 +354,14 @@ def test_with_a_key_all_is_signed_and_rises_in_time_on_each_link(scripted: Any, 
     assert [guard.judge(frame, number, when) for when, number, frame in field.sent] == [None] * len(field.sent)
     assert field.told().count("3 items") == 2
     assert set(_numbers(vehicles[1][0])) == {*ASKED_IN_ORDER, 242}
+
+
+def test_a_vehicle_whose_time_is_an_hour_ahead_believes_our_heartbeats(scripted: Any, flying_field: Any) -> None:
+    """Else it would take ours for a recording."""
+    vehicle = scripted(signer=Signer(KEY, last=timestamp_at(START + 3600 * SECOND)))
+    field = flying_field(Manners(heartbeat=True, key=KEY), {1: [vehicle]}).run(10)
+    ours = [int.from_bytes(frame[-12:-6], "little") for _, _, frame in field.sent]
+    assert min(ours) > timestamp_at(START + 3540 * SECOND)
 
 
 def test_with_a_key_a_stranger_causes_nothing_to_be_sent(scripted: Any, flying_field: Any) -> None:
