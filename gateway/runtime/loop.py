@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
@@ -57,7 +58,7 @@ def run_live(
     receiver = Receiver(mavlink, radar, allowed=allowed)
     try:
         run = Run(setup, receiver.started_at)
-        with _Abandoning(run):
+        with _Abandoning(run), _Unhurried():
             receiver.start()
             ended = _live(receiver, run, seconds, watch, asked_to_stop, no_place_after_s, manners)
             receiver.close()
@@ -182,6 +183,21 @@ def steps(
         gathered.append(arrival)
     if gathered:
         yield gathered, gathered[-1].received_at
+
+
+class _Unhurried:
+    """Keeps the collector of garbage off all that is there already, so that the receiving thread is never held up by it.
+
+    To look through the modules alone takes it 80 ms, in which nothing else runs here: at 10 000 datagrams a second three
+    times what a default receive buffer holds.
+    """
+
+    def __enter__(self) -> None:
+        gc.collect()
+        gc.freeze()
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+        gc.unfreeze()
 
 
 class _Abandoning:
