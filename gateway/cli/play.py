@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated
 
 import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
-from gateway.cli.replay import FilesArgument, read_speed
+from gateway.cli.replay import FilesArgument, FromOption, ToOption, read_speed, seek
 
 _HELP = """
 Send a recording onto UDP as it once came in, frame by frame, at its own intervals: for a `talkdown live`, or any ground
@@ -19,6 +20,8 @@ Every MAVLink peer of the recording has a socket of its own, so the receiver hea
 Examples:
 
   talkdown play flight.tlog
+
+  talkdown play flight.BIN --from 10:50 --to 13:00
 
   talkdown play sessions/20260301T120000Z-demo-field --mavlink udpout:127.0.0.1:14550 --speed 4
 """
@@ -31,6 +34,8 @@ def register(app: typer.Typer) -> None:
 
 def play(
     files: FilesArgument,
+    begin: FromOption = None,
+    end: ToOption = None,
     mavlink: Annotated[
         str, typer.Option("--mavlink", metavar="URL", help="Where MAVLink frames go.")
     ] = "udpout:127.0.0.1:14550",
@@ -45,8 +50,10 @@ def play(
     from gateway.runtime.folder import FolderError
     from gateway.runtime.playback import open_playback
     from gateway.runtime.player import play_onto
+    from gateway.runtime.seeking import SeekError
     from gateway.runtime.signals import StopSignals
     from gateway.runtime.urls import MAVLINK_PORT, RADAR_PORT, LinkError
+    from gateway.settings import Options
 
     pace = read_speed(speed, 1.0)
     (mavlink_url,) = take.read_urls([mavlink], MAVLINK_PORT)
@@ -56,9 +63,14 @@ def play(
             raise UsageError(f"play sends, so it needs udpout:HOST:PORT and not {url}.")
     try:
         playback = open_playback(files)
+        playback, options = seek(playback, Options(), begin, end, None)
+        if not quiet:
+            for note in playback.notes:
+                print(note, file=sys.stderr)
         with StopSignals() as stop:
-            sent = play_onto(playback, mavlink_url, radar_url, speed=pace, asked_to_stop=stop)
-    except (FileError, FolderError, LinkError) as error:
+            since = options.begins_at
+            sent = play_onto(playback, mavlink_url, radar_url, speed=pace, begins_at=since, asked_to_stop=stop)
+    except (FileError, FolderError, LinkError, SeekError) as error:
         raise UsageError(str(error)) from error
     except OSError as error:
         raise RunError(f"Sending failed: {(error.strerror or str(error)).lower()}.") from error

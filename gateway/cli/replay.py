@@ -2,26 +2,39 @@
 
 from __future__ import annotations
 
+import re
 import sys
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
 
+if TYPE_CHECKING:
+    from gateway.runtime.playback import Playback
+    from gateway.settings import Options
+
 _HELP = """
 Run recordings, or an archived session, again: the same path as live, as fast as it goes or at its own pace.
 
-Files are told by what is in them: .tlog, .pcap, .pcapng. Several are merged by their time stamps. A session's folder
-brings its site and options along and gives the same numbers, bit for bit.
+Files are told by what is in them: .tlog, .BIN, .ulg, .pcap, .pcapng. Several are merged by their time stamps. A session's
+folder brings its site and options along and gives the same numbers, bit for bit. A mission file (.plan, QGC WPL 110) is
+told to the gateway as the flight plan of the vehicle.
 
 Examples:
 
   talkdown replay flight.tlog
 
+  talkdown replay flight.BIN --from 10:50 --to 13:00
+
   talkdown replay flight.tlog radar.pcap --site field.toml --speed max --archive sessions
+
+  talkdown replay flight.tlog radar.pcap --mute gps:60:90 --mute radar:1:100:120
+
+  talkdown replay three-planes.tlog --plan mavlink:2=circuit.plan
 
   talkdown replay sessions/20260301T120000Z-demo-field --viewer none --json
 """
@@ -38,6 +51,36 @@ SpeedOption = Annotated[
         "--speed",
         metavar="max|N",
         help="N times its own pace. (default: 1 with a viewer, max without)",
+        show_default=False,
+    ),
+]
+FromOption = Annotated[
+    str | None,
+    typer.Option(
+        "--from",
+        metavar="T",
+        help="Begin here: 90, 1:30 or 1:02:03 after the start, or UTC (00:05:00Z, 2026-01-01T00:05:00Z).",
+        show_default=False,
+    ),
+]
+ToOption = Annotated[
+    str | None, typer.Option("--to", metavar="T", help="End here; written as for --from.", show_default=False)
+]
+MuteOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--mute",
+        metavar="WHAT[:N][:T:T]",
+        help="Do not listen to gps or radar (number N) from T to T; may be given several times.",
+        show_default=False,
+    ),
+]
+PlanOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--plan",
+        metavar="VEHICLE=FILE",
+        help="A mission file and whose it is, such as mavlink:2=circuit.plan; may be given several times.",
         show_default=False,
     ),
 ]
@@ -73,8 +116,47 @@ def read_speed(text: str | None, default: float | None) -> float | None:
     return speed
 
 
+def read_plans(texts: list[str] | None) -> list[tuple[str | None, Path]]:
+    """Mission files, each with its vehicle where it is named. Raises UsageError."""
+    plans: list[tuple[str | None, Path]] = []
+    for text in texts or []:
+        vehicle, equals, file = text.partition("=")
+        if equals and file and re.fullmatch(r"mavlink:\d{1,3}(@\d+)?", vehicle):
+            plans.append((vehicle, Path(file)))
+        elif not equals and text:
+            plans.append((None, Path(text)))
+        else:
+            raise UsageError(f"--plan {text!r} is not understood: write mavlink:2=FILE, or FILE for the only vehicle.")
+    return plans
+
+
+def seek(
+    playback: Playback, options: Options, begin: str | None, end: str | None, mutes: list[str] | None
+) -> tuple[Playback, Options]:
+    """The recording and the options with what --from, --to and --mute say. Raises SeekError."""
+    from gateway.runtime.seeking import SeekError
+
+    if begin is None and end is None and not mutes:
+        return playback, options
+    span = playback.span()
+    if begin is not None:
+        options = replace(options, begins_at=span.instant(begin, "--from"))
+    if mutes:
+        options = replace(options, mutes=tuple(span.mute(text) for text in mutes))
+    if end is not None:
+        ends_at = span.instant(end, "--to")
+        if options.begins_at is not None and ends_at <= options.begins_at:
+            raise SeekError(f"--to {end} is not after where the replay begins.")
+        playback = replace(playback, watermark=ends_at)
+    return playback, options
+
+
 def replay(
     files: FilesArgument,
+    begin: FromOption = None,
+    end: ToOption = None,
+    mute: MuteOption = None,
+    plan: PlanOption = None,
     site: take.SiteOption = None,
     speed: SpeedOption = None,
     viewer: take.ViewerOption = None,
@@ -92,6 +174,7 @@ def replay(
     from gateway.runtime.folder import FolderError
     from gateway.runtime.loop import run_replay
     from gateway.runtime.playback import open_playback
+    from gateway.runtime.seeking import SeekError
     from gateway.runtime.setup import RunFailure, Setup
     from gateway.runtime.signals import StopSignals
 
@@ -99,15 +182,19 @@ def replay(
     looks = chosen(viewer)
     pace = read_speed(speed, None if looks is take.Viewer.none else 1.0)
     try:
-        playback = open_playback(files)
+        playback = open_playback(files, read_plans(plan))
+        found = place or playback.place or playback.find_place()
+        options = take.change(playback.options, weighting, association)
+        has_own_place = place is not None or playback.place is not None
+        playback, options = seek(playback, options, begin, end, mute)
         setup = Setup(
-            place=place or playback.place or playback.find_place(),
-            options=take.change(playback.options, weighting, association),
+            place=found,
+            options=options,
             archive=archive,
             serve=take.read_serve(serve, looks),
             keys=take.read_keys(place, site),
             is_watched=pace is not None or looks is not take.Viewer.none,
-            name=files[0].stem if place is None and playback.place is None else "",
+            name="" if has_own_place else files[0].stem,
             command=tuple(sys.argv[1:]),
         )
         with (
@@ -115,9 +202,11 @@ def replay(
             Viewing(looks) as viewing,
             Display(viewing, quiet=quiet, as_json=json, fraction=playback.fraction) as display,
         ):
+            for note in playback.notes:
+                display.say(note)
             summary = run_replay(playback, setup, speed=pace, watch=display.watch, asked_to_stop=stop)
         display.show(summary)
-    except (FileError, FolderError) as error:
+    except (FileError, FolderError, SeekError) as error:
         raise UsageError(str(error)) from error
     except RunFailure as failure:
         raise RunError(str(failure)) from failure

@@ -21,6 +21,8 @@ Examples:
 
   talkdown site flight.tlog > field.toml
 
+  talkdown site flight.BIN > field.toml
+
   talkdown site udpin:0.0.0.0:14550 --seconds 30 > field.toml
 """
 

@@ -78,7 +78,7 @@ def look_over(sources: Iterable[Source], arrivals: Iterable[Arrival]) -> Overvie
     for arrival in arrivals:
         stamp, source = arrival.received_at, arrival.source
         extents[source] = (extents[source][0] if source in extents else stamp, stamp)
-        heard = decoder.feed(arrival)
+        heard = decoder.hear(arrival)
         for observation in () if heard is None else heard.observations:
             finder.gather(observation)
             if isinstance(observation, VehicleStatus):

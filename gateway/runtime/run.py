@@ -137,7 +137,7 @@ class Run:
 
     def _hear(self, arrivals: Sequence[Arrival]) -> list[Heard]:
         """Record and decode; what holds something for the picture."""
-        hear, counted, recorder = self._decoder.feed, self._arrivals, self._recorder
+        hear, counted, recorder = self._decoder.hear, self._arrivals, self._recorder
         if self._first_at is None and arrivals:
             self._first_at = arrivals[0].received_at
         heard: list[Heard] = []
@@ -145,14 +145,12 @@ class Run:
             if self._opening is not None and arrival.received_at >= self._opening.begins_at:
                 heard = self._open(heard, self._opening)
             counted[arrival.source] += 1
-            decoded: Heard | None = hear(arrival)
+            decoded = hear(arrival)
             if recorder is not None:
                 if self._decoder.refused is None:
                     recorder.keep(arrival)
                 else:
                     recorder.refuse(arrival)
-            if decoded is None or not (decoded.observations or decoded.notes):
-                continue
             if decoded is not None and self.setup.options.mutes:
                 decoded = self._muting.without_muted(decoded, arrival.received_at)
             if decoded is not None:
@@ -224,7 +222,7 @@ class Run:
     def _counters(self) -> dict[str, int]:
         gateway = self._tally.gateway_counters() if self._tally else {}
         outputs = self.outputs.counters() if self.outputs else {}
-        return {**self._link_counters, **self._decoder.counters(), **gateway, **outputs}
+        return {**self._link_counters, **self._decoder.counters(), **self._muting.counters, **gateway, **outputs}
 
     def _failure(self, error: OSError) -> RunFailure:
         where = self.folder or error.filename or "the archive"

@@ -10,6 +10,7 @@ from pathlib import Path
 from adapters import Arrival, Source
 from adapters.kinds import FileError
 from adapters.mission_files import MissionFileError, read_mission
+from adapters.told import encode_plan
 
 TOLD = "commands"  # the source of what people tell, and its file's stem in a session
 
@@ -19,8 +20,6 @@ Missions = Sequence[tuple[str | None, Path]]
 
 def told_plan(path: Path, aircraft: str, source: int, stamp: int) -> Arrival:
     """A mission file as what is told by a source at a stamp. Raises FileError for a file that cannot be used."""
-    from adapters.told import encode_plan
-
     try:
         points = read_mission(path)
     except MissionFileError as error:
