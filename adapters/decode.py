@@ -1,54 +1,46 @@
 """Arrivals to what was heard: the one door from bytes to observations, the same live and replayed.
 
 A pure function of the arrivals so far: no clock is read here, so that a replay of the same arrivals says the same.
+
+Counters of a MAVLink source, by reason:
+
+    frames, not a frame, system 0                            what came
+    crc error, definition differs, unknown id                what could not be read: damage, another dialect, no dialect of ours
+    lost, duplicate, reordered, unsequenced                  by the sequence numbers of each (system, component)
+    bad time, clock unsure, reboots                          times that are none, or of which boot is not known yet
+    undecided, heard twice                                   over several links: not known yet whose, and told before
+    signed, unchecked; unsigned, wrong signature, ...        without a key, and refused with one
+    no fix, position out of range, repeated, ...             messages that say nothing
+
+What links lose (kernel drops, resynced bytes) is counted with the links.
 """
 
 from __future__ import annotations
 
-from collections import Counter, deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
-from adapters import Arrival, Source
-from adapters.clock import SessionEpoch
+from adapters import Arrival, Source, told
+from adapters.clock import LIMIT_NS, SessionEpoch
+from adapters.listening import Listened
 from adapters.mavlink import MavlinkObserver
 from adapters.mavlink_frames import parse
 from adapters.meters import SECOND, SpeedMeter
 from adapters.radar import LandingRadarReceiver, Taken, observations
-from gateway.observation import Heard, Observation, Timing
-from gateway.picture import Health, SourceHealth
+from adapters.signing import advice
+from adapters.wellbeing import vehicles_health
+from gateway.observation import FlightPlan, Heard, Observation, PlanPoint, Timing
+from gateway.picture import Health
 
-_RATE_S = 10
+Observations = tuple[Observation, ...]
 
 
-@dataclass(slots=True)
-class _Listened:
-    """One source's health."""
+class FrameGuard(Protocol):
+    """Who decides which MAVLink frames are believed."""
 
-    source: Source
-    counters: Counter[str] = field(default_factory=Counter)
-    known_good: set[int] = field(default_factory=set)  # message ids that have passed their checksum
-    last_heard: int | None = None
-    lately: deque[list[int]] = field(default_factory=lambda: deque(maxlen=_RATE_S + 1))  # [second, observations]
-
-    def count(self, received_at: int, number: int) -> None:
-        """Take note of observations for the rate."""
-        second = received_at // SECOND
-        if self.lately and self.lately[-1][0] == second:
-            self.lately[-1][1] += number
-        else:
-            self.lately.append([second, number])
-
-    def health(self, received_at: int) -> SourceHealth:
-        """How the source is doing at a stamp."""
-        now = received_at // SECOND
-        number = sum(count for second, count in self.lately if now - _RATE_S <= second < now)
-        age_s = 0.0 if self.last_heard is None else max(received_at - self.last_heard, 0) / SECOND
-        reasons = tuple(
-            sorted((reason, total) for reason, total in self.counters.items() if total and reason != "lost")
-        )
-        source = self.source
-        return SourceHealth(source.name, source.kind, age_s, number / _RATE_S, max(self.counters["lost"], 0), reasons)
+    def judge(self, frame: bytes, source: int, now: int) -> str | None:
+        """Why a frame of a source is refused, or None: it is believed. `now` is its stamp. Never raises."""
 
 
 @dataclass(slots=True)
@@ -61,26 +53,37 @@ class Decoder:
     """Decodes the arrivals of a session, source by source, in the order of their stamps.
 
     `keys`: the key of each radar number that has one. `live`: a keyed datagram that is more than 10 s from the session's
-    time is refused; a replay does not repeat that. After each `feed`, `refused` is the reason why that arrival was
-    refused, or None: what was refused is to be recorded apart and not replayed; it has left no trace but its counter.
+    time is refused; a replay does not repeat that. `signing`: which MAVLink frames are believed; None: all. After each
+    arrival, `refused` is the reason why it was refused, or None: what was refused is to be recorded apart and not replayed;
+    it has left no trace but its counter.
     """
 
     def __init__(
-        self, sources: Sequence[Source] = (), *, keys: Mapping[int, bytes] | None = None, live: bool = False
+        self,
+        sources: Sequence[Source] = (),
+        *,
+        keys: Mapping[int, bytes] | None = None,
+        live: bool = False,
+        signing: FrameGuard | None = None,
     ) -> None:
         self.refused: str | None = None
         self._epoch = SessionEpoch()
         self._mavlink = MavlinkObserver(self._epoch)
+        self._wanted = self._mavlink.wanted
+        self._signing = signing
         self._radar = LandingRadarReceiver(dict(keys or {}), live)
         self._radar_clocks: dict[tuple[str, int], _RadarClock] = {}
-        self._listened: dict[int, _Listened] = {}
+        self._listened: dict[int, Listened] = {}
         self._notes = self._mavlink.notes
+        self._plans: dict[str, tuple[PlanPoint, ...]] = {}  # that were told, by aircraft
+        self._unclaimed: tuple[PlanPoint, ...] | None = None  # told of the first vehicle heard, and none was yet
+        self._health: tuple[int, int, Health] | None = None
         for source in sources:
             self.add(source)
 
     def add(self, source: Source) -> None:
         """A source that is new."""
-        self._listened[source.number] = _Listened(source)
+        self._listened[source.number] = Listened(source)
         self._mavlink.origins[source.number] = source.origin
 
     @property
@@ -92,26 +95,52 @@ class Decoder:
         """The session's time of a stamp, ns since 1970 UTC."""
         return self._epoch.session_time(received_at)
 
-    def feed(self, arrival: Arrival) -> Heard:
-        """One MAVLink frame or one radar datagram. Raises KeyError for a source that was not added, and nothing else."""
-        listened = self._listened[arrival.source]
-        listened.last_heard = arrival.received_at
+    def hear(self, arrival: Arrival) -> Heard | None:
+        """One MAVLink frame, radar datagram or told line; None where it observed nothing and there is nothing to say.
+
+        Raises KeyError for a source that was not added, and nothing else.
+        """
+        received_at, number, data, _ = arrival
+        listened = self._listened[number]
+        listened.last_heard = received_at
         self.refused = None
-        if listened.source.kind == "radar":
-            found = self._feed_radar(arrival, listened)
+        kind = listened.source.kind
+        settled = self._epoch.offset_s is not None
+        if kind == "mavlink":
+            if self._signing is not None and not self._believes(arrival, listened):
+                return self._heard(received_at, ())
+            if listened.passes(data, self._wanted, received_at):
+                return None if not self._notes else self._heard(received_at, ())
+            found = self._hear_mavlink(arrival, listened)
         else:
-            found = self._feed_mavlink(arrival, listened)
+            found = self._hear_radar(arrival, listened) if kind == "radar" else self._hear_told(arrival, listened)
+        if not found and not self._notes:
+            return None
+        if not settled and self._epoch.offset_s:
+            # The session's time leaps with this arrival: why is said in the time before, and the leap comes with the next.
+            listened.counters["clock settling"] += len(found)
+            return Heard(received_at, (), self._say())
         if found:
-            listened.count(arrival.received_at, len(found))
-        return Heard(self._epoch.session_time(arrival.received_at), found, self._say())
+            listened.count(received_at, len(found))
+        return Heard(self._epoch.session_time(received_at), found, self._say())
+
+    def feed(self, arrival: Arrival) -> Heard:
+        """The same, and a Heard also where there is nothing in it."""
+        return self.hear(arrival) or Heard(self._epoch.session_time(arrival.received_at))
 
     def watermark(self, received_at: int) -> Heard:
         """Nothing stamped at or before this is still to come."""
         return Heard(self._epoch.session_time(received_at), (), self._say())
 
     def health(self, received_at: int) -> Health:
-        """How each source is doing at a stamp."""
-        return Health(tuple(self._listened[number].health(received_at) for number in sorted(self._listened)))
+        """How each source and each vehicle is doing; made once for each second of stamps. Changes no observation."""
+        second, number = received_at // SECOND, len(self._listened)
+        if self._health is None or self._health[:2] != (second, number):
+            listened = [self._listened[number] for number in sorted(self._listened)]
+            names = {one.source.number: one.source.name for one in listened}
+            vehicles = vehicles_health(self._mavlink.registry, self._epoch, names, received_at)
+            self._health = second, number, Health(tuple(one.health(received_at) for one in listened), vehicles)
+        return self._health[2]
 
     def counters(self) -> dict[str, int]:
         """Totals by source and reason."""
@@ -122,6 +151,11 @@ class Decoder:
             if total
         }
 
+    def _heard(self, received_at: int, found: Observations) -> Heard | None:
+        if not found and not self._notes:
+            return None
+        return Heard(self._epoch.session_time(received_at), found, self._say())
+
     def _say(self) -> tuple[tuple[str, str], ...]:
         if not self._notes:
             return ()
@@ -129,7 +163,18 @@ class Decoder:
         self._notes.clear()
         return notes
 
-    def _feed_mavlink(self, arrival: Arrival, listened: _Listened) -> tuple[Observation, ...]:
+    def _believes(self, arrival: Arrival, listened: Listened) -> bool:
+        assert self._signing is not None
+        self.refused = reason = self._signing.judge(arrival.data, arrival.source, arrival.received_at)
+        if reason is None:
+            return True
+        listened.counters[reason] += 1
+        if reason not in listened.advised:
+            listened.advised.add(reason)
+            self._notes.append(("warning", advice(reason, listened.source.origin)))
+        return False
+
+    def _hear_mavlink(self, arrival: Arrival, listened: Listened) -> Observations:
         frame = parse(arrival.data)
         if frame is None:
             listened.counters["not a frame"] += 1
@@ -141,11 +186,43 @@ class Decoder:
             listened.counters["crc error" if frame.message in listened.known_good else "definition differs"] += 1
         else:
             listened.counters[frame.verdict] += 1
-        if frame.signed:
+        if frame.signed and self._signing is None:
             listened.counters["signed, unchecked"] += 1
-        return self._mavlink.hear(arrival.source, frame, arrival.received_at, listened.counters)
+        found = self._mavlink.hear(arrival.source, frame, arrival.received_at, listened.counters)
+        if frame.system and (place := frame.system << 8 | frame.component) not in listened.components:
+            listened.components[place] = self._mavlink.registry.component(arrival.source, frame.system, frame.component)
+        return self._with_plans(found, arrival.received_at) if self._plans or self._unclaimed else found
 
-    def _feed_radar(self, arrival: Arrival, listened: _Listened) -> tuple[Observation, ...]:
+    def _hear_told(self, arrival: Arrival, listened: Listened) -> Observations:
+        plan = told.decode(arrival.data)
+        if plan is None:
+            listened.counters["not understood"] += 1
+            return ()
+        listened.counters["plans"] += 1
+        if plan.aircraft == told.ANYBODY:
+            self._unclaimed = plan.points
+            return self._with_plans((), arrival.received_at)
+        return (self._tell(plan.aircraft, plan.points, arrival.received_at),)
+
+    def _tell(self, aircraft: str, points: tuple[PlanPoint, ...], received_at: int) -> FlightPlan:
+        self._plans[aircraft] = points
+        return FlightPlan(aircraft, self._epoch.session_time(received_at), received_at, points)
+
+    def _with_plans(self, found: Observations, received_at: int) -> Observations:
+        """What was told of the first vehicle heard, once there is one; and a home that is heard leaves a told plan whole."""
+        if self._unclaimed is not None and (vehicles := self._mavlink.registry.vehicles()):
+            found = (*found, self._tell(vehicles[0].name, self._unclaimed, received_at))
+            self._unclaimed = None
+        return tuple(self._joined(one) if isinstance(one, FlightPlan) else one for one in found)
+
+    def _joined(self, plan: FlightPlan) -> FlightPlan:
+        kept = self._plans.get(plan.aircraft)
+        if kept is None or any(point.kind != "home" for point in plan.points):
+            return plan
+        points = (*plan.points, *(point for point in kept if point.kind != "home"))
+        return FlightPlan(plan.aircraft, plan.valid_at, plan.received_at, points)
+
+    def _hear_radar(self, arrival: Arrival, listened: Listened) -> Observations:
         origin = listened.source.origin if not arrival.peer else f"{arrival.peer} on {listened.source.origin}"
         now = self._epoch.session_time(arrival.received_at)
         self._radar.counters = listened.counters
@@ -166,6 +243,8 @@ class Decoder:
             text = f"The session runs on the clock of radar {header.radar}, {self._epoch.offset_s:+d} s from this machine's."
             self._notes.append(("info", text))
         timing = self._epoch.timing(key)
+        if timing is Timing.PROVISIONAL and abs(header.time - received_at) >= LIMIT_NS:
+            return Timing.FOREIGN  # until the session's time is known nobody can say that it is late
         if timing is Timing.FOREIGN and not clock.is_named_foreign:
             clock.is_named_foreign = True
             lag = self._epoch.lag_s(key)

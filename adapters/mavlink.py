@@ -81,7 +81,7 @@ class MavlinkObserver:
     @property
     def wanted(self) -> frozenset[int]:
         """The messages that say something."""
-        return frozenset((*self._readers, *MISSION_MESSAGES))
+        return frozenset((*_READERS, *_ROLES, *MISSION_MESSAGES, traffic.ADSB_VEHICLE, drone_id.OPEN_DRONE_ID_LOCATION))
 
     def hear(self, source: int, frame: Frame, received_at: int, counters: Counter[str]) -> Observations:
         """One frame of a source: what it observed; counts in the source's counters what is refused. Never raises."""

@@ -232,7 +232,7 @@ class SigningGuard:
 
 def advice(reason: str, origin: str) -> str:
     """What to tell a person the first time that a source's frame is refused for a reason."""
-    return f"{origin}: {_ADVICE[reason]}"
+    return f"{origin}: {_ADVICE.get(reason, f'frames are refused ({reason}).')}"
 
 
 _ADVICE = {

@@ -213,8 +213,8 @@ class Registry:
         if None in verdicts:
             return None
         other = self._new(member.system, counters)
-        there = ", ".join(self.origins[number] for number in sorted(alive[0].sources))
-        text = f"Two vehicles say that they are system {member.system}: {alive[0].name} on {there}, "
+        links = ", ".join(self.origins[number] for number in sorted(alive[0].sources))
+        text = f"Two vehicles say that they are system {member.system}: {alive[0].name} on {links}, "
         text += f"{other.name} on {self.origins[member.source]}."
         self.notes.append(("warning", text))
         return other

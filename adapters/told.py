@@ -1,0 +1,97 @@
+"""What people tell the gateway: one JSON object a line. Today that is a flight plan:
+
+    {"told": "plan", "aircraft": "mavlink:1", "points": [
+        {"sequence": 1, "kind": "waypoint", "latitude_deg": 31.0, "longitude_deg": 104.0, "altitude_above_home_m": 50.0}, ...]}
+
+A point has an altitude above mean sea level (`altitude_msl_m`) or above home, or none. Aircraft "*", or none: the first
+vehicle that is heard.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+from gateway.observation import PlanPoint
+
+ANYBODY = "*"
+LONGEST_LINE = 4_000_000
+_KINDS = frozenset(("home", "waypoint", "loiter", "take-off", "landing", "other"))
+_ALTITUDES_M = 100_000.0
+
+
+@dataclass(frozen=True, slots=True)
+class ToldPlan:
+    """A flight plan as it was told, and of whom: "mavlink:1", or "*" for the first vehicle heard."""
+
+    aircraft: str
+    points: tuple[PlanPoint, ...]
+
+
+def encode_plan(aircraft: str, points: Sequence[PlanPoint]) -> bytes:
+    """A flight plan as one told line, without the line's end."""
+    told = {"told": "plan", "aircraft": aircraft, "points": [_plain(point) for point in points]}
+    return json.dumps(told, allow_nan=False).encode()
+
+
+def decode(data: bytes) -> ToldPlan | None:
+    """What a told line says; None where it is not understood as a whole. Never raises."""
+    if len(data) > LONGEST_LINE:
+        return None
+    try:
+        told = json.loads(data)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(told, dict) or told.get("told") != "plan" or not isinstance(told.get("points"), list):
+        return None
+    aircraft = told.get("aircraft", ANYBODY)
+    points = [_point(one) for one in told["points"]]
+    if not isinstance(aircraft, str) or not aircraft or None in points:
+        return None
+    kept = cast(list[PlanPoint], points)
+    if len({point.sequence for point in kept}) != len(kept):
+        return None
+    return ToldPlan(aircraft, tuple(sorted(kept, key=lambda point: point.sequence)))
+
+
+def _plain(point: PlanPoint) -> dict[str, Any]:
+    plain: dict[str, Any] = {
+        "sequence": point.sequence,
+        "kind": point.kind,
+        "latitude_deg": math.degrees(point.latitude_rad),
+        "longitude_deg": math.degrees(point.longitude_rad),
+    }
+    if point.altitude_msl_m is not None:
+        plain["altitude_msl_m"] = point.altitude_msl_m
+    if point.altitude_above_home_m is not None:
+        plain["altitude_above_home_m"] = point.altitude_above_home_m
+    return plain
+
+
+def _point(told: object) -> PlanPoint | None:
+    if not isinstance(told, dict):
+        return None
+    sequence, kind = told.get("sequence"), told.get("kind", "other")
+    latitude, longitude = _number(told.get("latitude_deg"), 90.0), _number(told.get("longitude_deg"), 180.0)
+    if type(sequence) is not int or not 0 <= sequence < 1 << 16 or not isinstance(kind, str) or kind not in _KINDS:
+        return None
+    if latitude is None or longitude is None:
+        return None
+    altitudes = []
+    for name in ("altitude_msl_m", "altitude_above_home_m"):
+        given = told.get(name)
+        altitude = None if given is None else _number(given, _ALTITUDES_M)
+        if given is not None and altitude is None:
+            return None
+        altitudes.append(altitude)
+    return PlanPoint(sequence, kind, math.radians(latitude), math.radians(longitude), *altitudes)
+
+
+def _number(told: object, most: float) -> float | None:
+    """A finite number within plus and minus `most`; None for anything else."""
+    if isinstance(told, bool) or not isinstance(told, int | float):
+        return None
+    return float(told) if abs(told) <= most else None
