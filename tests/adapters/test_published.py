@@ -8,6 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as dialect
 
+from adapters import Arrival, Source
+from adapters.decode import Decoder
 from adapters.mavlink_frames import FrameEncoder, encode
 from adapters.published import Traffic, adsb_vehicle, heartbeat, is_made_up, key_of, made_up_address
 
@@ -132,3 +134,14 @@ def test_no_state_is_refused_and_every_report_can_be_read(
     assert abs(message.lat) <= 900000000
     assert abs(message.lon) <= 1800000000
     assert message.heading < 36000
+
+
+def test_what_another_gateway_publishes_under_a_made_up_address_is_no_news_and_counted() -> None:
+    decoder = Decoder([Source(1, "mavlink", "station", "a peer")])
+    encoder, at = FrameEncoder(1, 156), 1_790_000_000_000_000_000
+    for number, address in enumerate((made_up_address(7), 0x4840D6)):
+        parts = {name: getattr(HERE, name) for name in Traffic.__dataclass_fields__}
+        frame = adsb_vehicle(encoder, Traffic(**{**parts, "address": address, "altitude_msl_m": 500.0}))
+        heard = decoder.feed(Arrival(at + number * 4000, 1, frame))
+        assert [getattr(one, "aircraft", None) for one in heard.observations] == ["icao:4840d6"] * number
+    assert decoder.counters()["station address that a gateway made up"] == 1
