@@ -138,6 +138,7 @@ class Run:
     def _hear(self, arrivals: Sequence[Arrival]) -> list[Heard]:
         """Record and decode; what holds something for the picture."""
         hear, counted, recorder = self._decoder.hear, self._arrivals, self._recorder
+        publishing = self.outputs if self.outputs is not None and self.outputs.publishes_on else None
         if self._first_at is None and arrivals:
             self._first_at = arrivals[0].received_at
         heard: list[Heard] = []
@@ -145,6 +146,10 @@ class Run:
             if self._opening is not None and arrival.received_at >= self._opening.begins_at:
                 heard = self._open(heard, self._opening)
             counted[arrival.source] += 1
+            if publishing is not None and publishing.is_our_own(arrival.data):
+                if recorder is not None:
+                    recorder.refuse(arrival)
+                continue
             decoded = hear(arrival)
             if recorder is not None:
                 if self._decoder.refused is None:
