@@ -16,8 +16,11 @@ KINDS = {
     "RadarPlot": "radar plots",
     "RadarStatus": "radar status",
     "Attitude": "attitudes",
+    "ImuSample": "IMU samples",
+    "AirData": "air data",
     "VehicleStatus": "vehicle status",
     "FlightPlan": "flight plans",
+    "Intent": "intents",
     "Truth": "truths",
 }
 

@@ -1,4 +1,4 @@
-"""How the viewer opens: the scene of the airfield large, the map and the plots beside it, the log below."""
+"""How the viewer opens: the scene of the airfield large, the map and the plots beside it, the log below; health apart."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import rerun.blueprint as rrb
 
 from gateway.settings import Site
 from gateway.sinks.scene import style
+from gateway.sinks.scene.health import SOURCES, VEHICLES, unit_part
 from gateway.sinks.scene.scope import Scope
 from gateway.sinks.scene.site import approach_reach_m
 
@@ -19,46 +20,74 @@ _RECENT = rrb.TimeRange(  # an approach lasts this long; left alone the viewer s
 
 def blueprint(site: Site, *, modes: bool = False) -> rrb.Blueprint:
     """The views of a session at this site; one of the mode probabilities only where the estimator has `modes`."""
-    units = style.units_of(site)
     return rrb.Blueprint(
-        rrb.Horizontal(
-            rrb.Vertical(
-                scene_view(site),
-                rrb.Horizontal(
-                    scope_view(site),
-                    rrb.Tabs(_log(), rrb.StateTimelineView(origin="/fuse/state", name="Tracks")),
-                    column_shares=[3, 2],
-                ),
-                row_shares=[3, 2],
-            ),
-            rrb.Vertical(
-                map_view(site),
-                rrb.Tabs(
-                    _plot("Approach, degrees off", ["/approach/angle/**"], rrb.Corner2D.RightTop),
-                    _plot(
-                        f"Approach, {units.length} off",
-                        ["/approach/**", "- /approach/angle/**", "- /approach/distance/**", "- /approach/scope/**"],
-                    ),
-                    _plot(f"Distance to threshold, {units.distance}", ["/approach/distance/**"]),
-                ),
-                rrb.Tabs(
-                    _plot(f"Biases, {units.length}", ["/register/gps/**", "/register/radar/**"]),
-                    *([_plot("Modes", ["/fuse/modes/**"])] if modes else []),
-                    _plot(f"Speed, {units.speed}", ["/fuse/**", "- /fuse/modes/**", "- /fuse/sigma/**"]),
-                    _plot(f"Sigma, {units.length}", ["/fuse/sigma/**"]),
-                    _plot("Association", ["/associate/**"]),
-                    _plot("Health", ["/health/**"]),
-                    _plot("Lateness, s", ["/align/**"]),
-                ),
-                row_shares=[4, 3, 3],
-            ),
-            column_shares=[5, 3],
-        ),
+        rrb.Tabs(_picture_page(site, modes), _health_page(), active_tab=0),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         rrb.TimePanel(state="collapsed", timeline="utc", play_state="following"),
         auto_views=False,
         auto_layout=False,
+    )
+
+
+def _picture_page(site: Site, modes: bool) -> rrb.Horizontal:
+    units = style.units_of(site)
+    return rrb.Horizontal(
+        rrb.Vertical(
+            scene_view(site),
+            rrb.Horizontal(
+                scope_view(site),
+                rrb.Tabs(_log(), rrb.StateTimelineView(origin="/fuse/state", name="Tracks")),
+                column_shares=[3, 2],
+            ),
+            row_shares=[3, 2],
+        ),
+        rrb.Vertical(
+            map_view(site),
+            rrb.Tabs(
+                _plot("Approach, degrees off", ["/approach/angle/**"], rrb.Corner2D.RightTop),
+                _plot(
+                    f"Approach, {units.length} off",
+                    ["/approach/**", "- /approach/angle/**", "- /approach/distance/**", "- /approach/scope/**"],
+                ),
+                _plot(f"Distance to threshold, {units.distance}", ["/approach/distance/**"]),
+            ),
+            rrb.Tabs(
+                _plot(f"Biases, {units.length}", ["/register/gps/**", "/register/radar/**"]),
+                *([_plot("Modes", ["/fuse/modes/**"])] if modes else []),
+                _plot(f"Speed, {units.speed}", ["/fuse/**", "- /fuse/modes/**", "- /fuse/sigma/**"]),
+                _plot(f"Sigma, {units.length}", ["/fuse/sigma/**"]),
+                _plot("Association", ["/associate/**"]),
+                _plot("Lateness, s", ["/align/**"]),
+            ),
+            row_shares=[4, 3, 3],
+        ),
+        column_shares=[5, 3],
+        name="Picture",
+    )
+
+
+def _health_page() -> rrb.Horizontal:
+    """What is heard of whom, and what vehicles last said of themselves: tables to read beside curves."""
+    speeds, lengths = f"/health/reading/{unit_part('m/s')}/**", f"/health/reading/{unit_part('m')}/**"
+    inner = [f"- /health/{part}/**" for part in ("lost", "time", "reading", "table")]
+    return rrb.Horizontal(
+        rrb.Vertical(
+            rrb.TextDocumentView(origin=VEHICLES, name="Vehicles"),
+            rrb.TextDocumentView(origin=SOURCES, name="Sources"),
+            row_shares=[3, 2],
+        ),
+        rrb.Vertical(
+            rrb.Tabs(
+                _plot("Readings, m/s", [speeds]),
+                _plot("Readings, m", [lengths]),
+                _plot("Other readings", ["/health/reading/**", f"- {speeds}", f"- {lengths}"]),
+            ),
+            _plot("Clocks and delays, ms", ["/health/time/**"]),
+            rrb.Tabs(_plot("Heard", ["/health/**", *inner]), _plot("Lost", ["/health/lost/**"])),
+        ),
+        column_shares=[2, 3],
+        name="Health",
     )
 
 

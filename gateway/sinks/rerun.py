@@ -12,7 +12,9 @@ from gateway.sinks.feed import FileFeed, Identity, ServedFeed
 from gateway.sinks.recording import optimise
 from gateway.sinks.scene.entry import Entry
 from gateway.sinks.scene.flown import Flights
+from gateway.sinks.scene.health import HealthScene
 from gateway.sinks.scene.paths import ApproachScene, PredictScene
+from gateway.sinks.scene.plans import PlanScene
 from gateway.sinks.scene.scope import ScopeScene
 from gateway.sinks.scene.site import SiteScene
 from gateway.sinks.scene.sources import SourceScene, raw_positions
@@ -58,7 +60,7 @@ class RerunSink:
             raise
         self._flights, self._sources, self._tracks = Flights(site), SourceScene(site), TrackScene(site)
         self._approach, self._predict, self._stages = ApproachScene(site), PredictScene(site), StageScene(site)
-        self._scope = ScopeScene(site)
+        self._scope, self._health, self._plans = ScopeScene(site), HealthScene(), PlanScene(site)
         self._period_ns, self._rows_limit = round(period_s * 1e9), rows_limit
         self._waiting: list[Picture] = []
         self._rows = 0
@@ -113,6 +115,8 @@ class RerunSink:
             *self._approach.entries(flights),
             *self._predict.entries(pictures, flights),
             *self._stages.entries(pictures, flights, self._flights.newest),
+            *self._health.entries(pictures),
+            *self._plans.entries(pictures, flights),
         ]
         for picture in pictures:
             for ended in picture.fuse.ended:

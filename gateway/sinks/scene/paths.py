@@ -16,7 +16,8 @@ from gateway.settings import Site
 from gateway.sinks.approach import deviations
 from gateway.sinks.scene import style
 from gateway.sinks.scene.entry import Always, Entry, entity, rows, strips_3d, strips_on_map
-from gateway.sinks.scene.flown import BEFORE_ALL, Flown
+from gateway.sinks.scene.flown import Flown
+from gateway.sinks.scene.lately import Lately
 
 Floats = NDArray[np.float64]
 
@@ -28,7 +29,7 @@ class ApproachScene:
 
     def __init__(self, site: Site) -> None:
         self._runway, self._units = site.runway, style.units_of(site)
-        self._named: set[int] = set()
+        self._named: Lately[int] = Lately()
 
     def entries(self, flights: Sequence[Flown]) -> list[Entry]:
         """The rows of those tracks that are on the approach."""
@@ -38,8 +39,9 @@ class ApproachScene:
             known = np.isfinite(off.distance_m)
             if not known.any():
                 continue
-            if flown.track not in self._named:
-                self._named.add(flown.track)
+            for above in (off.vertical_m, off.vertical_rad):
+                above[~flown.has_height] = np.nan
+            if self._named.is_new(flown.track, int(flown.time[-1])):
                 entries += self._looks(flown.track)
             length, distance = self._units.lengths, self._units.distances
             for path, columns in (
@@ -69,9 +71,9 @@ class PredictScene:
 
     def __init__(self, site: Site) -> None:
         self._frame = RunwayFrame(site.runway)
-        self._newest: dict[int, int] = {}
+        self._newest: Lately[int] = Lately()
         self._here: dict[int, Floats] = {}  # the last position of each track: where its prediction starts
-        self._looked: set[int] = set()
+        self._looked: Lately[int] = Lately()
 
     def entries(self, pictures: Sequence[Picture], flights: Sequence[Flown]) -> list[Entry]:
         """The predictions that these pictures add; each stands until the next one is made."""
@@ -89,7 +91,8 @@ class PredictScene:
 
     def end(self, track: int, at: int) -> None:
         """A track ended: what was predicted for it until then is not drawn any more."""
-        self._newest[track] = max(self._newest.get(track, BEFORE_ALL), at)
+        self._newest.is_new(track, at)
+        self._looked.drop(track)
         self._here.pop(track, None)
 
     def _made(self, predicted: Predicted, known: dict[int, Flown]) -> list[tuple[int, int, list[Floats]]]:
@@ -99,9 +102,9 @@ class PredictScene:
         found = []
         keys = np.stack([predicted.track, predicted.made], axis=-1)
         for track, made in dict.fromkeys(map(tuple, keys.tolist())):
-            if made < self._newest.get(track, BEFORE_ALL):
+            if made < self._newest.at(track):
                 continue
-            self._newest[track] = made
+            self._newest.is_new(track, made)
             index = np.flatnonzero((predicted.track == track) & (predicted.made == made))
             methods = dict.fromkeys(predicted.method[row] for row in index)
             strips: list[Floats] = []
@@ -131,8 +134,7 @@ class PredictScene:
         latitude, longitude, _ = self._frame.geodetic_from_runway(np.concatenate(strips))
         ground = np.split(np.degrees(np.stack([latitude, longitude], axis=-1)), ends)
         entries: list[Entry] = []
-        if track not in self._looked:
-            self._looked.add(track)
+        if self._looked.is_new(track, int(time[-1])):
             radius = style.points(0.8)
             line = rr.LineStrips3D.from_fields(colors=look, radii=radius)
             entries.append(Always(path, (line, rr.GeoLineStrings.from_fields(colors=look, radii=radius))))

@@ -17,6 +17,7 @@ from gateway.settings import Runway, Site
 from gateway.sinks.scene import style
 from gateway.sinks.scene.entry import Always, Entry, entity, rows
 from gateway.sinks.scene.flown import Flown
+from gateway.sinks.scene.lately import Lately
 from gateway.sinks.scene.site import approach_reach_m
 from gateway.sinks.scene.sources import Positions, raw_path
 
@@ -67,7 +68,7 @@ class ScopeScene:
 
     def __init__(self, site: Site) -> None:
         self._site, self._units, self.scope = site, style.units_of(site), Scope(site)
-        self._looked: set[str] = set()
+        self._looked: Lately[str] = Lately()
 
     def entries(self, heard: Sequence[Positions], flights: Sequence[Flown]) -> list[Entry]:
         """The rows of raw positions and of tracks."""
@@ -75,10 +76,10 @@ class ScopeScene:
         for one in heard:
             colour, size = (style.RADAR, 1.0) if one.is_plot else (style.GPS, 2.0)
             path = ROOT + raw_path(one.source).removeprefix("/raw")
-            entries += self._dots(path, colour, size, one.time, one.step, one.runway_m)
+            entries += self._dots(path, colour, size, one.time, one.step, one.runway_m, one.has_height)
         for flown in flights:
             path = entity("approach", "scope", flown.track)
-            entries += self._dots(path, style.FUSED, 1.2, flown.time, flown.step, flown.runway_m)
+            entries += self._dots(path, style.FUSED, 1.2, flown.time, flown.step, flown.runway_m, flown.has_height)
         return entries
 
     def _dots(
@@ -89,15 +90,16 @@ class ScopeScene:
         time: NDArray[np.int64],
         step: NDArray[np.int64],
         place: Floats,
+        has_height: NDArray[np.bool_],
     ) -> list[Entry]:
         spots = self.scope.both(place)
+        spots[~has_height, 0] = np.nan
         shown = np.asarray(np.isfinite(spots).all(axis=-1))
         known = np.asarray(shown.any(axis=1))
         if not known.any():
             return []
         entries: list[Entry] = []
-        if path not in self._looked:
-            self._looked.add(path)
+        if self._looked.is_new(path, int(time[-1])):
             look = rr.Points2D.from_fields(
                 colors=colour, radii=style.points(size), draw_order=31.0 if colour == style.FUSED else 30.0
             )

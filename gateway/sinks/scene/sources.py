@@ -16,10 +16,12 @@ from gateway.picture import Picture
 from gateway.settings import Site
 from gateway.sinks.scene import style
 from gateway.sinks.scene.entry import Always, Entry, entity, in_order, rows
+from gateway.sinks.scene.lately import Lately
 from gateway.sinks.scene.trail import Trail
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 
 def raw_path(source: str) -> str:
@@ -37,6 +39,7 @@ class Positions:
     time: Ints  # (n,) ns
     step: Ints  # (n,)
     runway_m: Floats  # (n, 3)
+    has_height: Bools  # (n,); without one the third coordinate is a guess
 
 
 def raw_positions(pictures: Sequence[Picture]) -> list[Positions]:
@@ -48,10 +51,12 @@ def raw_positions(pictures: Sequence[Picture]) -> list[Positions]:
         place = np.concatenate([part.plot_runway_m if is_plot else part.report_runway_m for part in parts])
         named = [part.plot_radar_track if is_plot else part.report_aircraft for part in parts]
         names = [name for part in named for name in part]
+        known = np.concatenate([np.ones(0, np.bool_), *(part.report_has_height for part in parts)])
+        has_height = np.ones(len(time), dtype=np.bool_) if is_plot else known
         step = np.repeat([picture.step for picture in pictures], [len(part) for part in named])
         for name, index in _by_name(names, np.asarray(np.isfinite(place).all(axis=1))):
             index = index[in_order(time[index])]
-            found.append(Positions(name, is_plot, time[index], step[index], place[index]))
+            found.append(Positions(name, is_plot, time[index], step[index], place[index], has_height[index]))
     return found
 
 
@@ -62,7 +67,8 @@ class SourceScene:
         self._frame = RunwayFrame(site.runway)
         self._geoid_m = site.runway.geoid_separation_m or 0.0
         self._trails: dict[str, Trail] = {}
-        self._named: set[str] = set()
+        self._drawn: Lately[str] = Lately(self._trails.pop)
+        self._named: Lately[str] = Lately()
 
     def entries(self, pictures: Sequence[Picture], heard: Sequence[Positions]) -> list[Entry]:
         """The rows that these pictures add; `heard` are their raw positions."""
@@ -102,7 +108,7 @@ class SourceScene:
         latitude, longitude, _ = self._frame.geodetic_from_runway(place)
         lat_lon = np.degrees(np.stack([latitude, longitude], axis=-1))
         entries: list[Entry] = []
-        if path not in self._trails:
+        if self._drawn.is_new(path, int(time[-1])):
             line = kind == "line"
             self._trails[path] = Trail(path, "line" if line else "points", colour, 1.0 if line else 0.8)
             look = rr.Points3D.from_fields(colors=colour, radii=style.points(2.0 if line else 3.5))
@@ -123,8 +129,7 @@ class SourceScene:
         entries: list[Entry] = []
         for source, told in late.items():
             path = entity("align", source)
-            if source not in self._named:
-                self._named.add(source)
+            if self._named.is_new(source, told[-1][0]):
                 entries.append(Always(path, (rr.SeriesLines(names=f"{source} heard after, s"),)))
             time, step, lateness = (np.array(column) for column in zip(*sorted(told), strict=True))
             entries.append(rows(path, time, step, rr.Scalars.columns(scalars=lateness)))

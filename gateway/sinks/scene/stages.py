@@ -1,10 +1,9 @@
-"""The other stages and the gateway itself: /track, /associate, /register, /health, /log, and the end of tracks."""
+"""The other stages: /track, /associate, /register, /log, and the end of tracks."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -14,21 +13,13 @@ from gateway.picture import Picture
 from gateway.settings import Site
 from gateway.sinks.scene import style
 from gateway.sinks.scene.entry import Always, Entry, entity, once, rows
-from gateway.sinks.scene.flown import BEFORE_ALL, Flown
+from gateway.sinks.scene.flown import Flown
+from gateway.sinks.scene.lately import BEFORE_ALL, Lately
+from gateway.sinks.scene.samples import Sample, plotted
 from gateway.sinks.scene.sources import raw_path
 
-SAMPLE_NS = 1_000_000_000  # health and counts are read by people: once a second
+SAMPLE_NS = 1_000_000_000  # counts are read by people: once a second
 _LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
-
-
-class Sample(NamedTuple):
-    """One row of a plot."""
-
-    path: str
-    time: int
-    step: int
-    values: tuple[float, ...]
-    names: tuple[str, ...]
 
 
 class StageScene:
@@ -37,7 +28,7 @@ class StageScene:
     def __init__(self, site: Site) -> None:
         self._site, self._units = site, style.units_of(site)
         self._sampled = BEFORE_ALL
-        self._named: set[str] = set()
+        self._named: Lately[str] = Lately()
         self._sources: dict[int, set[str]] = {}
 
     def entries(
@@ -59,7 +50,7 @@ class StageScene:
                 self._sampled = picture.now
                 samples += self._sample(picture)
             entries += self._ended(picture, log, newest)
-        entries += self._plotted(samples)
+        entries += plotted(samples, self._named)
         if log:
             log.sort(key=lambda line: line[0])
             time, step, texts, levels = zip(*log, strict=True)
@@ -67,22 +58,6 @@ class StageScene:
             told = [f"{instant[11:]} {text}" for instant, text in zip(clock.tolist(), texts, strict=True)]
             lines = rr.TextLog.columns(text=told, level=[_LEVELS.get(level, "INFO") for level in levels])
             entries.append(rows("/log", time, step, lines))
-        return entries
-
-    def _plotted(self, samples: Sequence[Sample]) -> list[Entry]:
-        """Samples as rows, an entity at a time."""
-        found: dict[str, list[Sample]] = {}
-        for sample in samples:
-            found.setdefault(sample.path, []).append(sample)
-        entries: list[Entry] = []
-        for path, mine in found.items():
-            if path not in self._named:
-                self._named.add(path)
-                entries.append(Always(path, (rr.SeriesLines(names=mine[0].names),)))
-            mine.sort(key=lambda sample: sample.time)
-            values = rr.Scalars.columns(scalars=np.array([sample.values for sample in mine], dtype=np.float64))
-            time, step = [sample.time for sample in mine], [sample.step for sample in mine]
-            entries.append(rows(path, time, step, values))
         return entries
 
     def _checks(self, picture: Picture) -> list[Sample]:
@@ -106,8 +81,7 @@ class StageScene:
             if not any(text in event.text for event in picture.events):
                 log.append((change.at, picture.step, text, "info"))
             path = entity("associate", "point", change.aircraft)
-            if path not in self._named:
-                self._named.add(path)
+            if self._named.is_new(path, change.at):
                 look = rr.Points3D.from_fields(colors=style.JOINED, radii=style.points(6.0), show_labels=True)
                 entries.append(Always(path, (look,)))
             mark = rr.Points3D.columns(positions=[change.runway_m], labels=[text])
@@ -115,7 +89,7 @@ class StageScene:
         return entries
 
     def _sample(self, picture: Picture) -> list[Sample]:
-        """Counts, corrections and health at this instant."""
+        """Counts and corrections at this instant."""
         told: list[tuple[str, tuple[float, ...], tuple[str, ...]]] = []
         counts = (float(len(picture.track.active)), float(picture.track.untracked))
         told.append(("/track", counts, ("radar tracks", "plots of no track")))
@@ -126,10 +100,6 @@ class StageScene:
             told.append((entity("register", "radar", radar), (length,), (title,)))
             both = (f"radar {radar} azimuth error, degrees", f"radar {radar} elevation error, degrees")
             told.append((entity("register", "angle", radar), (math.degrees(azimuth), math.degrees(elevation)), both))
-        for source in picture.health.sources:
-            name = source.name
-            titles = (f"{name} last heard, s ago", f"{name} rate, 1/s", f"{name} lost")
-            told.append((entity("health", name), (source.age_s, source.rate_hz, float(source.lost)), titles))
         return [Sample(path, picture.now, picture.step, values, names) for path, values, names in told]
 
     def _ended(

@@ -15,6 +15,8 @@ FUSED: Colour = (235, 50, 50)
 
 TRUTH: Colour = (150, 150, 150)
 PREDICTED: Colour = (255, 140, 160)
+PLAN: Colour = (150, 190, 120)
+NEXT: Colour = (190, 255, 120)
 JOINED: Colour = (255, 230, 80)
 TEXT: Colour = (235, 235, 235)
 

@@ -19,7 +19,8 @@ from gateway.settings import Site
 from gateway.sinks.scene import style
 from gateway.sinks.scene.attitude import ellipsoid, quaternion_from_attitude
 from gateway.sinks.scene.entry import Always, Entry, entity, rows, strips_3d
-from gateway.sinks.scene.flown import BEFORE_ALL, Flown
+from gateway.sinks.scene.flown import Flown
+from gateway.sinks.scene.lately import BEFORE_ALL
 from gateway.sinks.scene.site import approach_reach_m
 from gateway.sinks.scene.trail import Trail
 
@@ -136,7 +137,10 @@ class TrackScene:
         roll, pitch, yaw = flown.attitude_rad.T
         quaternion = quaternion_from_attitude(roll, pitch, yaw, self._frame.runway.landing_compass_rad)
         length = np.clip(0.1 * np.linalg.norm(flown.runway_m, axis=-1), 40.0, self._longest_m)
-        half, axes = ellipsoid(self._frame, flown.covariance, ELLIPSOID_SIGMAS)
+        covariance = flown.covariance.reshape(-1, 6, 6).copy()
+        flat = ~flown.has_height  # a guess's hundreds of metres would hide everything else
+        covariance[flat, 2, :] = covariance[flat, :, 2] = 0.0
+        half, axes = ellipsoid(self._frame, covariance, ELLIPSOID_SIGMAS)
         placed = rr.Transform3D.columns(
             translation=flown.runway_m, quaternion=quaternion, scale=np.repeat(length[:, None], 3, axis=1)
         )
@@ -148,20 +152,13 @@ class TrackScene:
 
     def _label(self, flown: Flown, drawn: _Drawn) -> list[Entry]:
         """Who it is, how high, how fast: the data block of a controller's screen."""
-        units, chosen, texts = self._units, [], []
+        chosen, texts = [], []
         for row, now in enumerate(flown.time.tolist()):
             if now - drawn.labelled < LABEL_NS and flown.state[row] == drawn.labelled_state:
                 continue
             drawn.labelled, drawn.labelled_state = now, flown.state[row]
-            who = flown.aircraft[row] or f"radar {flown.radar_track[row]}"
-            east, north, up = flown.velocity_mps[row].tolist()
-            speed = f"{np.hypot(east, north) * units.speeds:.0f} {units.speed}"
-            climb = (
-                f"{'↑' if up >= 0.0 else '↓'}{abs(up) * units.climbs:.{1 if units is style.SI else 0}f} {units.climb}"
-            )
-            altitude = f"{flown.altitude_m[row] * units.lengths:.0f} {units.length}"
             chosen.append(row)
-            texts.append(f"{who} {flown.state[row]}\n{altitude} {speed} {climb}")
+            texts.append(self._block(flown, row))
         if not chosen:
             return []
         place = flown.runway_m[chosen]
@@ -170,12 +167,31 @@ class TrackScene:
         drop = strips_3d(list(np.stack([place, place * [1.0, 1.0, 0.0]], axis=1)))
         return [rows(f"{entity('fuse', flown.track)}/label", flown.time[chosen], flown.step[chosen], block, drop)]
 
+    def _block(self, flown: Flown, row: int) -> str:
+        """Two lines of text; a pressure altitude is named as one, because it is no height."""
+        units = self._units
+        who = flown.aircraft[row] or f"radar {flown.radar_track[row]}"
+        if flown.callsign[row]:
+            who = f"{flown.callsign[row]} {who}"
+        along, left, up = flown.velocity_mps[row].tolist()
+        parts = ["height unknown"]
+        if flown.has_height[row]:
+            parts = [f"{flown.altitude_m[row] * units.lengths:.0f} {units.length}"]
+        elif np.isfinite(flown.pressure_altitude_m[row]):
+            parts = [f"pressure altitude {flown.pressure_altitude_m[row] * units.lengths:.0f} {units.length}"]
+        parts.append(f"{np.hypot(along, left) * units.speeds:.0f} {units.speed}")
+        if np.isfinite(up):
+            digits = 1 if units is style.SI else 0
+            parts.append(f"{'↑' if up >= 0.0 else '↓'}{abs(up) * units.climbs:.{digits}f} {units.climb}")
+        return f"{who} {flown.state[row]}\n{' '.join(parts)}"
+
     def _plots(self, flown: Flown, drawn: _Drawn) -> list[Entry]:
         """Sigmas, mode probabilities and the error of the position source, where the estimator has them."""
         track, units = flown.track, self._units
         variance = flown.covariance.reshape(-1, 6, 6)[:, [0, 1, 2], [0, 1, 2]]
         horizontal = np.sqrt(np.maximum(0.5 * (variance[:, 0] + variance[:, 1]), 0.0))
-        sigma = np.stack([horizontal, np.sqrt(np.maximum(variance[:, 2], 0.0))], axis=-1) * units.lengths
+        vertical = np.where(flown.has_height, np.sqrt(np.maximum(variance[:, 2], 0.0)), np.nan)
+        sigma = np.stack([horizontal, vertical], axis=-1) * units.lengths
         aircraft = next((name for name in flown.aircraft if name), None)
         kinds = [
             ("sigma", entity("fuse", "sigma", track), sigma, ("horizontal", "vertical"), f" sigma, {units.length}"),
@@ -188,7 +204,7 @@ class TrackScene:
             )
         entries: list[Entry] = []
         for kind, path, values, names, quantity in kinds:
-            known = np.isfinite(values).all(axis=1)
+            known = np.isfinite(values[:, 0])
             if not known.any():
                 continue
             if kind not in drawn.named:

@@ -15,7 +15,7 @@ from gateway.associate import Associated, Change
 from gateway.frames import RunwayFrame, turn
 from gateway.fuse import Ended, Fused
 from gateway.observation import Attitude, GpsReport, RadarPlot, Truth
-from gateway.picture import Event, Health, Picture, SourceHealth
+from gateway.picture import Event, Health, Picture, SourceHealth, VehicleHealth
 from gateway.predict import Predicted
 from gateway.register import Registered
 from gateway.settings import DEMO_SITE, Site
@@ -173,6 +173,14 @@ class _Maker:
             changes,
         )
 
+    def vehicle(self, time_s: float) -> VehicleHealth:
+        """A clock that settles after 5 s, and an aircraft that says how fast and how high it flies."""
+        speed = float(np.linalg.norm(path(np.array([time_s]))[1]))
+        settled = time_s >= 5.0
+        times = (0.002, 0.01, 0.3) if settled else (math.nan,) * 3
+        readings = (("airspeed, m/s", speed), ("altitude, m", 600.0), ("temperature, K", 288.0))
+        return VehicleHealth(AIRCRAFT, "UTC" if settled else "not settled", *times, readings, (("landed", "in air"),))
+
     def picture(self, step: int, first_s: float, last_s: float, end: bool) -> Picture:
         time_s = first_s + step * TICK_S
         gps = step % round(5.0 / TICK_S) == 3
@@ -207,7 +215,7 @@ class _Maker:
             fuse=fused,
             predict=predicted,
             truth=(truth,) if step % 5 == 0 else (),
-            health=Health(sources),
+            health=Health(sources, (self.vehicle(time_s),)),
             events=(Event(now, "info", "the session begins"),) if step == 0 else (),
         )
 

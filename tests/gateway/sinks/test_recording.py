@@ -19,9 +19,11 @@ from rerun.chunk import RrdReader
 
 from gateway.frames import RunwayFrame
 from gateway.fuse import Ended, Fused
+from gateway.observation import RadarPlot
 from gateway.settings import DEMO_SITE
 from gateway.sinks.recording import optimise
 from gateway.sinks.rerun import RerunSink
+from gateway.sinks.scene.lately import Lately
 
 Entities = dict[str, list[dict[str, Any]]]
 START = 1_772_366_400_000_000_000
@@ -248,3 +250,75 @@ def test_what_is_no_recording_stays_as_it_is(tmp_path):
     assert not optimise(path)
     assert path.read_bytes() == b"not a recording"
     assert [file.name for file in tmp_path.iterdir()] == ["a.rrd"]
+
+
+def test_without_a_height_the_label_says_so_and_no_vertical_is_drawn(tmp_path, pictures):
+    """The track is drawn flat at the guess; its elevation, its vertical deviation and its sigma are not drawn at all."""
+    made = []
+    for picture in pictures(20.0, first_s=300.0):
+        rows = len(picture.fuse.time)
+        unknown = replace(
+            picture.fuse,
+            height_m=np.full(rows, np.nan),
+            altitude_msl_m=np.full(rows, np.nan),
+            velocity_mps=picture.fuse.velocity_mps * [1.0, 1.0, np.nan],
+            pressure_altitude_m=np.full(rows, 1234.0),
+            callsign=("TDN12",) * rows,
+        )
+        guessed = replace(picture.align, report_has_height=picture.align.report_has_height & False)
+        made.append(replace(picture, fuse=unknown, align=guessed))
+    record(tmp_path / "a.rrd", made)
+    entities = read(tmp_path / "a.rrd")
+    labels = [row["Points3D:labels"][0] for row in entities["/fuse/1/label"] if "utc" in row]
+    assert labels[0].startswith("TDN12 mavlink:1 fused\npressure altitude 1234 m ")
+    for path, place in (("/approach/1", 0), ("/approach/angle/1", 0), ("/fuse/sigma/1", 1)):
+        values = [row["Scalars:scalars"] for row in entities[path] if "utc" in row]
+        assert values, path
+        assert all(np.isnan(value[place]) and np.isfinite(value[1 - place]) for value in values), path
+    half = [row["Ellipsoids3D:half_sizes"][0] for row in entities["/fuse/1/ellipsoid"] if "utc" in row]
+    assert all(min(axes) == 0.0 < max(axes) for axes in half)
+    shown = [len(row["Points2D:positions"]) for row in entities["/approach/scope/1"] if "utc" in row]
+    assert set(shown) == {1}  # of elevation and azimuth, the latter
+
+
+def test_memory_is_bounded_by_who_was_there_lately(pictures):
+    """Forty minutes in which a new aircraft appears every ten seconds: what is drawn is not remembered beyond ten minutes."""
+    (picture,) = pictures(0.2)
+    template = next(one for one in pictures(6.0) if len(one.fuse.time) and len(one.align.report_time))
+    sink = RerunSink(DEMO_SITE)
+    held = []
+    for number in range(240):
+        shift, name = number * 10_000_000_000, f"icao:{number:06x}"
+        fused = template.fuse
+        rows = len(fused.time)
+        new = replace(
+            template,
+            now=template.now + shift,
+            step=number,
+            fuse=replace(
+                fused,
+                time=fused.time + shift,
+                track=np.full(rows, number),
+                aircraft=(name,) * rows,
+                ended=(Ended(template.now + shift, number - 1, "no data for 30 s"),) if number else (),
+            ),
+            align=replace(template.align, report_aircraft=(name,), report_time=template.align.report_time + shift),
+            observations=tuple(
+                replace(one, aircraft=name, valid_at=one.valid_at + shift, received_at=one.received_at + shift)
+                for one in template.observations
+                if not isinstance(one, RadarPlot)
+            ),
+            health=picture.health,
+        )
+        sink.write(new)
+        if number in (80, 239):
+            held.append(remembered(sink))
+    sink.close()
+    assert held[1] <= 1.2 * held[0], held
+
+
+def remembered(sink: RerunSink) -> int:
+    """How many things the parts of a sink hold in all their tables."""
+    parts = [part for part in vars(sink).values() if type(part).__module__.startswith("gateway.sinks.scene")]
+    held = [value for part in parts for value in vars(part).values()]
+    return sum(len(value) for value in held if isinstance(value, dict | set | Lately))
