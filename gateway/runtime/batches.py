@@ -31,7 +31,7 @@ _DROPS_HEADER = (20, socket.SOL_SOCKET | SO_RXQ_OVFL << 32)
 
 @dataclass(frozen=True, slots=True)
 class Datagrams:
-    """Columns of what came: contents, senders ("" where the system told none), kernel times (ns since 1970 UTC, or None).
+    """Columns of what came: contents, senders, kernel times (ns since 1970 UTC, or None).
 
     `dropped` is how many the kernel had dropped since the socket was opened, modulo 2^32; None: it did not say.
     `is_full`: there may be more.

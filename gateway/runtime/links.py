@@ -12,8 +12,8 @@ import socket
 import struct
 import sys
 from collections import Counter
-from itertools import repeat
-from typing import NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import Protocol
 
 from gateway.runtime.batches import SO_RXQ_OVFL, SO_TIMESTAMPNS, batches_of
 from gateway.runtime.urls import LinkError, Url, bracketed
@@ -30,18 +30,18 @@ _ASK_DROPS_NS = 1_000_000_000
 _PEERS_REMEMBERED = 1024
 
 
-class Chunk(NamedTuple):
-    """Bytes that came in at once: a datagram, or a piece of a stream.
+@dataclass(frozen=True, slots=True)
+class Chunks:
+    """What one link has heard at once, in columns, because tens of thousands a second come: datagrams, or pieces of a stream.
 
-    `peer` tells senders of one link apart; `stream` numbers the connections of a byte stream (None: a datagram);
-    `kernel_utc_ns` is the kernel's time of arrival where the platform tells it. A NamedTuple, because tens of thousands
-    a second are made.
+    `peers` tells the senders of one link apart; `kernel_utc_ns` is the kernel's time of arrival where the platform tells
+    it; `stream` numbers the connections of a byte stream (None: datagrams).
     """
 
-    peer: str
-    data: bytes
+    peers: list[str]
+    data: list[bytes]
+    kernel_utc_ns: list[int | None]
     stream: int | None
-    kernel_utc_ns: int | None
 
 
 class Link(Protocol):
@@ -54,7 +54,7 @@ class Link(Protocol):
     def fileno(self) -> int | None:
         """What to wait on, or None: closed at the moment, or to be asked at every turn."""
 
-    def receive(self) -> list[Chunk]:
+    def receive(self) -> Chunks:
         """What has come in; never waits."""
 
     def send(self, data: bytes, peer: str | None) -> bool:
@@ -151,47 +151,49 @@ class UdpLink:
         number = self._socket.fileno()
         return number if number >= 0 else None
 
-    def receive(self) -> list[Chunk]:
+    def receive(self) -> Chunks:
         """The datagrams that wait, at most a turn's worth."""
-        chunks: list[Chunk] = []
+        chunks = Chunks([], [], [], None)
         try:
-            while len(chunks) < _DATAGRAMS_A_TURN and self._take(chunks):
+            while len(chunks.data) < _DATAGRAMS_A_TURN and self._take(chunks):
                 pass
         except (BlockingIOError, InterruptedError):
             pass
         except OSError as error:  # "nobody there" in answer to what we sent, or a network that went away
             self._failed(error)
-        self._heard = self._heard or bool(chunks)
+        self._heard = self._heard or bool(chunks.data)
         return chunks
 
-    def _take(self, chunks: list[Chunk]) -> bool:
+    def _take(self, chunks: Chunks) -> bool:
         """Add the next datagrams; whether there may be more. Raises OSError for what the socket has to report."""
         if self._batches is None:
-            chunks.append(self._one_datagram())
+            self._take_one(chunks)
             return True
         batch = self._batches.receive()
         if batch is None:
             return False
         if batch.dropped is not None:
             self._lost(batch.dropped)
-        chunks += map(Chunk, batch.peers, batch.contents, repeat(None), batch.kernel_utc_ns)
+        chunks.peers.extend(batch.peers)
+        chunks.data.extend(batch.contents)
+        chunks.kernel_utc_ns.extend(batch.kernel_utc_ns)
         return batch.is_full
 
-    def _one_datagram(self) -> Chunk:
+    def _take_one(self, chunks: Chunks) -> None:
+        kernel_utc_ns: int | None = None
         if not _LINUX:
             data, address = self._socket.recvfrom(_LARGEST_DATAGRAM)
-            return Chunk(_named(address), data, None, None)
-        data, ancillary, _, address = self._socket.recvmsg(_LARGEST_DATAGRAM, _ANCILLARY_BYTES)
-        kernel_utc_ns: int | None = None
-        for level, kind, content in ancillary:
-            if level != socket.SOL_SOCKET:
-                continue
-            if kind == SO_TIMESTAMPNS and len(content) == 16:
-                seconds, nanoseconds = struct.unpack("@qq", content)
-                kernel_utc_ns = seconds * 1_000_000_000 + nanoseconds
-            elif kind == SO_RXQ_OVFL and len(content) == 4:
-                self._lost(struct.unpack("@I", content)[0])
-        return Chunk(_named(address) if address else str(self.url), data, None, kernel_utc_ns)
+        else:
+            data, ancillary, _, address = self._socket.recvmsg(_LARGEST_DATAGRAM, _ANCILLARY_BYTES)
+            for level, kind, content in ancillary:
+                if (level, kind, len(content)) == (socket.SOL_SOCKET, SO_TIMESTAMPNS, 16):
+                    seconds, nanoseconds = struct.unpack("@qq", content)
+                    kernel_utc_ns = seconds * 1_000_000_000 + nanoseconds
+                elif (level, kind, len(content)) == (socket.SOL_SOCKET, SO_RXQ_OVFL, 4):
+                    self._lost(struct.unpack("@I", content)[0])
+        chunks.peers.append(_named(address) if address else str(self.url))
+        chunks.data.append(data)
+        chunks.kernel_utc_ns.append(kernel_utc_ns)
 
     def _lost(self, dropped: int) -> None:
         """The kernel has dropped so many datagrams in all, modulo 2^32."""

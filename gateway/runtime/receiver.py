@@ -130,8 +130,8 @@ class Receiver:
             link.tend(now_ns)
         self._send_what_waits()
         self._wait(wait_s)
-        heard = [(number, chunks) for number, link in enumerate(self._links) if (chunks := link.receive())]
-        count = sum(len(chunks) for _, chunks in heard)
+        heard = [(number, chunks) for number, link in enumerate(self._links) if (chunks := link.receive()).data]
+        count = sum(len(chunks.data) for _, chunks in heard)
         self._has_heard = count > 0
         sources, arrivals = self._intake.take(heard)
         notes = [note for link in self._links for note in link.news]

@@ -39,15 +39,18 @@ class Stamper:
         Both clocks are read once for all: read for each, their jitter would turn datagrams around.
         """
         now, utc = self.now(), self._utc_ns()
-        return [
-            now if kernel is None or not 0 <= utc - kernel < _BELIEVED_AGE_NS else now - (utc - kernel)
-            for kernel in kernel_utc_ns
-        ]
+        oldest, ahead = utc - _BELIEVED_AGE_NS, now - utc
+        return [kernel + ahead if kernel and oldest < kernel <= utc else now for kernel in kernel_utc_ns]
 
-    def stamp(self, heard_at: int) -> int:
-        """A stamp for what was heard then: at or just before it, later than every stamp and watermark given before."""
-        self._last = max(heard_at // STAMP_STEP_NS * STAMP_STEP_NS, self._last + STAMP_STEP_NS)
-        return self._last
+    def stamps(self, heard_at: Sequence[int]) -> list[int]:
+        """Stamps for what was heard then: each at or just before it, later than every stamp and watermark given before."""
+        last, given = self._last, []
+        for at in heard_at:
+            at -= at % STAMP_STEP_NS
+            last = at if at > last else last + STAMP_STEP_NS
+            given.append(last)
+        self._last = last
+        return given
 
     def watermark(self) -> int:
         """A time at or before which nothing will be stamped any more."""

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections import Counter
 from typing import Any
 
-from gateway.runtime.links import RECEIVE_BUFFER_BYTES, Chunk, addresses
+from gateway.runtime.links import RECEIVE_BUFFER_BYTES, Chunks, addresses
 from gateway.runtime.urls import LinkError, Url
 
 _CONNECT_TIMEOUT_S = 5.0
@@ -70,6 +70,9 @@ class _StreamLink(ABC):
     @property
     @abstractmethod
     def _is_open(self) -> bool: ...
+
+    def _chunks(self, pieces: list[bytes]) -> Chunks:
+        return Chunks([str(self.url)] * len(pieces), pieces, [None] * len(pieces), self._stream)
 
     def send(self, data: bytes, peer: str | None) -> bool:
         """Send to the only peer there is. What cannot go out at once is dropped, but a frame never in its middle."""
@@ -139,10 +142,10 @@ class TcpLink(_StreamLink):
         """The connection's descriptor, or None while there is no connection."""
         return self._socket.fileno() if self._socket is not None and self._is_open else None
 
-    def receive(self) -> list[Chunk]:
+    def receive(self) -> Chunks:
         """What the connection has brought."""
-        chunks: list[Chunk] = []
-        while self._socket is not None and self._is_open and len(chunks) < _READS_A_TURN:
+        pieces: list[bytes] = []
+        while self._socket is not None and self._is_open and len(pieces) < _READS_A_TURN:
             try:
                 data = self._socket.recv(_READ_BYTES)
             except (BlockingIOError, InterruptedError):
@@ -153,8 +156,8 @@ class TcpLink(_StreamLink):
             if not data:
                 self._lost("the other side closed the connection")
                 break
-            chunks.append(Chunk(str(self.url), data, self._stream, None))
-        return chunks
+            pieces.append(data)
+        return self._chunks(pieces)
 
     def _write(self, data: bytes) -> int:
         assert self._socket is not None
@@ -229,16 +232,16 @@ class SerialLink(_StreamLink):
         except (AttributeError, OSError, ValueError):
             return None  # a port that has no descriptor, such as pyserial's loop://
 
-    def receive(self) -> list[Chunk]:
+    def receive(self) -> Chunks:
         """What the port has brought."""
         if self._port is None:
-            return []
+            return self._chunks([])
         try:
             data = bytes(self._port.read(_READ_BYTES))
         except (OSError, TypeError) as error:  # a radio that was unplugged; TypeError: pyserial's, closed while reading
             self._lost(_reason(error))
-            return []
-        return [Chunk(str(self.url), data, self._stream, None)] if data else []
+            data = b""
+        return self._chunks([data] if data else [])
 
     def _write(self, data: bytes) -> int:
         descriptor = self.fileno()

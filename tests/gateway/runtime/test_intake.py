@@ -2,7 +2,7 @@
 
 from adapters.mavlink_frames import encode
 from gateway.runtime.intake import PEERS_AT_MOST, Intake
-from gateway.runtime.links import Chunk
+from gateway.runtime.links import Chunks
 from gateway.runtime.stamps import Stamper
 
 HEARTBEAT = {"type": 1, "autopilot": 3, "base_mode": 0, "custom_mode": 0, "system_status": 4, "mavlink_version": 3}
@@ -19,12 +19,17 @@ def intake(mavlink: int = 1, radar: int = 1) -> Intake:
     return Intake(stamper, [f"link {n}" for n in range(mavlink)], [f"radar link {n}" for n in range(radar)])
 
 
+def said(peer: str, *data: bytes, stream: int | None = None, kernel: tuple[int | None, ...] = ()) -> Chunks:
+    """What one peer said, each piece with the kernel's time where it is told."""
+    return Chunks([peer] * len(data), list(data), list(kernel) or [None] * len(data), stream)
+
+
 def test_links_are_merged_by_the_kernels_times_of_arrival() -> None:
     takes = intake()
     _, arrivals = takes.take(
         [
-            (0, [Chunk("a", frame(0), None, NOW - 3_000_000), Chunk("a", frame(1), None, NOW - 1_000_000)]),
-            (1, [Chunk("r", b"plot", None, NOW - 2_000_000)]),
+            (0, said("a", frame(0), frame(1), kernel=(NOW - 3_000_000, NOW - 1_000_000))),
+            (1, said("r", b"plot", kernel=(NOW - 2_000_000,))),
         ]
     )
     assert [arrival.data for arrival in arrivals] == [frame(0), b"plot", frame(1)]
@@ -32,15 +37,14 @@ def test_links_are_merged_by_the_kernels_times_of_arrival() -> None:
 
 def test_what_one_link_says_keeps_its_order_whatever_the_kernel_stamped() -> None:
     takes = intake()
-    late, early = Chunk("a", frame(0), None, NOW - 1_000), Chunk("a", frame(1), None, NOW - 9_000)
-    _, arrivals = takes.take([(0, [late, early])])
+    _, arrivals = takes.take([(0, said("a", frame(0), frame(1), kernel=(NOW - 1_000, NOW - 9_000)))])
     assert [arrival.data for arrival in arrivals] == [frame(0), frame(1)]
 
 
 def test_sources_are_numbered_once_and_named_apart() -> None:
     takes = intake(2, 2)
-    first, _ = takes.take([(0, [Chunk("a", frame(0), None, None)]), (1, [Chunk("a", frame(0), None, None)])])
-    again, _ = takes.take([(0, [Chunk("a", frame(1), None, None)])])
+    first, _ = takes.take([(0, said("a", frame(0))), (1, said("a", frame(0)))])
+    again, _ = takes.take([(0, said("a", frame(1)))])
     assert [(source.number, source.name) for source in first] == [
         (0, "radar-1"),
         (1, "radar-2"),
@@ -53,13 +57,13 @@ def test_sources_are_numbered_once_and_named_apart() -> None:
 def test_a_connection_that_begins_anew_never_completes_a_frame_of_the_one_before() -> None:
     takes = intake()
     whole = frame(5)
-    takes.take([(0, [Chunk("a", frame(4) + whole[:9], 0, None)])])
-    _, arrivals = takes.take([(0, [Chunk("a", whole[9:] + frame(6), 1, None)])])
+    takes.take([(0, said("a", frame(4) + whole[:9], stream=0))])
+    _, arrivals = takes.take([(0, said("a", whole[9:] + frame(6), stream=1))])
     assert [arrival.data for arrival in arrivals] == [frame(6)]
 
 
 def test_more_peers_than_anyone_has_are_counted_and_not_heard() -> None:
     takes = intake()
-    sources, _ = takes.take([(0, [Chunk(f"peer {n}", frame(0), None, None) for n in range(PEERS_AT_MOST + 3)])])
+    sources, _ = takes.take([(0, said(f"peer {n}", frame(0))) for n in range(PEERS_AT_MOST + 3)])
     assert sum(source.kind == "mavlink" for source in sources) == PEERS_AT_MOST
     assert takes.counters["link 0"]["datagrams of too many peers"] == 3
