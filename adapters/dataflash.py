@@ -3,16 +3,15 @@
     VER, MSG, PARM, MODE, ARM, EV, STAT      HEARTBEAT, EXTENDED_SYS_STATE (each second)
     GPS, GPA of instance 0                   GPS_RAW_INT; with GMS and GWk the UTC of SYSTEM_TIME
     POS, XKF1 or NKF1 of core 0, ATT         GLOBAL_POSITION_INT, ATTITUDE
-    IMU                                      HIGHRES_IMU, at the logged rate, its id the instance
-    BARO                                     SCALED_PRESSURE, SCALED_PRESSURE2, SCALED_PRESSURE3
+    IMU, MAG                                 HIGHRES_IMU, at the logged rate, its id the instance
+    BARO with ARSP                           SCALED_PRESSURE, SCALED_PRESSURE2, SCALED_PRESSURE3; without ARSP HIGHRES_IMU
     ARSP, else CTUN with an airspeed         VFR_HUD
     XKF2 or NKF2 of core 0                   WIND
     SIM with SIM2                            SIM_STATE; without SIM2, which has the velocity, SIMSTATE
     ORGN of type 1                           HOME_POSITION
     CMD, MISE                                MISSION_COUNT and MISSION_ITEM_INT, MISSION_CURRENT
 
-What a log does not hold is not told. UTC is GPS time less 18 leap seconds, as ArduPilot itself reckons it, at the time when
-the receiver's message came (GPA.SMS), else when it was logged.
+What a log does not hold is not told. UTC: see dataflash_identity.py.
 """
 
 from __future__ import annotations
@@ -23,9 +22,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import BinaryIO
 
+from adapters.dataflash_identity import WANTED
 from adapters.dataflash_reader import DataflashReader, Entry, Values
 from adapters.telling import (
-    FIXES_FOR_UTC,
+    ABSOLUTE_PRESSURE,
+    ACCELERATION,
+    FIELD,
+    RATE,
+    TEMPERATURE,
     Identity,
     Teller,
     centidegrees,
@@ -35,82 +39,14 @@ from adapters.telling import (
     millimetres,
     number,
     speed_cms,
-    utc_offset_us,
 )
 
-_WANTED = {
-    "PARM": ("Name", "Value"),
-    "MSG": ("Message",),
-    "VER": ("BU",),
-    "MODE": ("Mode", "ModeNum"),
-    "ARM": ("ArmState",),
-    "EV": ("Id",),
-    "STAT": ("isFlying", "Armed"),
-    "GPS": ("I", "Status", "GMS", "GWk", "NSats", "HDop", "Lat", "Lng", "Alt", "Spd", "GCrs", "VZ"),
-    "GPA": ("I", "VDop", "HAcc", "VAcc", "SAcc", "SMS", "AEl"),
-    "POS": ("Lat", "Lng", "Alt", "RelHomeAlt"),
-    "XKF1": ("C", "VN", "VE", "VD"),
-    "NKF1": ("C", "VN", "VE", "VD"),
-    "XKF2": ("C", "VWN", "VWE"),
-    "NKF2": ("C", "VWN", "VWE"),
-    "ATT": ("Roll", "Pitch", "Yaw"),
-    "IMU": ("I", "GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ", "T"),
-    "BARO": ("I", "Press", "Temp"),
-    "ARSP": ("I", "Airspeed", "DiffPress"),
-    "CTUN": ("As", "ThO"),
-    "SIM": ("Roll", "Pitch", "Yaw", "Alt", "Lat", "Lng", "Q1", "Q2", "Q3", "Q4"),
-    "SIM2": ("VN", "VE", "VD"),
-    "ORGN": ("Type", "Lat", "Lng", "Alt"),
-    "CMD": ("CTot", "CNum", "CId", "Prm1", "Prm2", "Prm3", "Prm4", "Lat", "Lng", "Alt", "Frame"),
-    "MISE": ("CTot", "CNum"),
-}
-_ARDUPILOT = 3
-_TYPES_BY_BUILD = {1: 10, 2: 2, 3: 1, 4: 5, 7: 12, 12: 7, 13: 4}  # VER.BU to MAV_TYPE
-_TYPES_BY_WORD = {"Plane": 1, "Copter": 2, "Rover": 10, "Sub": 12, "Blimp": 7, "Tracker": 5}
-_BOAT, _ROVER, _BOAT_FRAME = 11, 10, 2
-_SYSTEM_PARAMETERS = ("SYSID_THISMAV", "MAV_SYSID")
 _HOME = 1  # ORGN.Type
 _ARMED_EVENT, _DISARMED_EVENT = 10, 11
 _ON_GROUND, _IN_AIR = 1, 2
-_GPS_EPOCH_S, _LEAP_S, _WEEK_S = 315_964_800, 18, 604_800
 _FRESH_US = 500_000  # a velocity or heading older than this is not the position's
-_ACCELERATION_RATE_AND_TEMPERATURE = 0x103F
 _STATION = {"target_system": 255, "target_component": 190}
 _PRESSURES = ("SCALED_PRESSURE", "SCALED_PRESSURE2", "SCALED_PRESSURE3")
-
-
-def identity_of(file: BinaryIO) -> Identity:
-    """Whose log it is. Reads until its UTC is known, else to the end."""
-    system, kind, boat, differences = 1, 0, False, []
-    for moment in DataflashReader(file, _WANTED).moments():
-        latest = {entry.name: entry.values for entry in moment if entry.values.get("I", 0) == 0}
-        for entry in moment:
-            values = entry.values
-            if entry.name == "VER":
-                kind = _TYPES_BY_BUILD.get(values.get("BU", 0), kind)
-            elif entry.name == "MSG" and not kind:
-                said = values.get("Message", "")
-                kind = next((one for word, one in _TYPES_BY_WORD.items() if f"Ardu{word}" in said or word == said), 0)
-            elif entry.name == "PARM" and values.get("Name") in _SYSTEM_PARAMETERS:
-                system = int(values["Value"]) if 1 <= values.get("Value", 0) <= 255 else system
-            elif entry.name == "PARM" and values.get("Name") == "FRAME_CLASS":
-                boat = values.get("Value") == _BOAT_FRAME
-        if "GPS" in latest and (difference := _difference_us(moment[0].time_us, latest)) is not None:
-            differences.append(difference)
-            if len(differences) == FIXES_FOR_UTC:
-                break
-    kind = _BOAT if boat and kind == _ROVER else kind
-    return Identity(system, 1, kind, _ARDUPILOT, utc_offset_us(differences))
-
-
-def _difference_us(time_us: int, latest: dict[str, Values]) -> int | None:
-    """UTC minus time since boot by one fix; None where the receiver knows no time."""
-    fix, accuracies = latest["GPS"], latest.get("GPA", {})
-    week, milliseconds, sampled_ms = fix.get("GWk"), fix.get("GMS"), accuracies.get("SMS")
-    if not isinstance(week, int) or not isinstance(milliseconds, int) or fix.get("Status", 0) < 3:
-        return None
-    at_us = sampled_ms * 1000 if sampled_ms and isinstance(sampled_ms, int) else time_us
-    return (_GPS_EPOCH_S - _LEAP_S + week * _WEEK_S) * 10**6 + milliseconds * 1000 - at_us
 
 
 @dataclass(slots=True)
@@ -132,6 +68,7 @@ class DataflashFrames:
             "POS": self._position,
             "ATT": self._attitude,
             "IMU": self._inertial,
+            "MAG": self._field,
             "BARO": self._pressure,
             "ARSP": self._air,
             "CTUN": self._air,
@@ -146,7 +83,7 @@ class DataflashFrames:
     def __iter__(self) -> Iterator[tuple[int, bytes]]:
         """Stamp (ns since 1970 UTC, strictly increasing multiples of 4000) and frame."""
         teller = self._teller
-        for moment in DataflashReader(self.file, _WANTED, self.counters).moments():
+        for moment in DataflashReader(self.file, WANTED, self.counters).moments():
             for entry in moment:
                 self._remember(entry)
             teller.begin(moment[0].time_us)
@@ -244,30 +181,28 @@ class DataflashFrames:
         )
 
     def _inertial(self, sample: Values) -> None:
-        none = dict.fromkeys(("xmag", "ymag", "zmag", "abs_pressure", "diff_pressure", "pressure_alt"), math.nan)
-        self._teller.tell(
-            "HIGHRES_IMU",
-            time_usec=self._teller.boot_us,
-            xacc=sample["AccX"],
-            yacc=sample["AccY"],
-            zacc=sample["AccZ"],
-            xgyro=sample["GyrX"],
-            ygyro=sample["GyrY"],
-            zgyro=sample["GyrZ"],
+        self._teller.measure(
+            sample.get("I", 0),
+            ACCELERATION | RATE | (TEMPERATURE if "T" in sample else 0),
+            **{f"{axis.lower()}acc": sample[f"Acc{axis}"] for axis in "XYZ"},
+            **{f"{axis.lower()}gyro": sample[f"Gyr{axis}"] for axis in "XYZ"},
             temperature=number(sample.get("T")),
-            fields_updated=_ACCELERATION_RATE_AND_TEMPERATURE,
-            id=sample.get("I", 0),
-            **none,
         )
 
+    def _field(self, sample: Values) -> None:
+        gauss = {f"{axis.lower()}mag": sample[f"Mag{axis}"] / 1000 for axis in "XYZ"}
+        self._teller.measure(sample.get("I", 0), FIELD, **gauss)
+
     def _pressure(self, air: Values) -> None:
-        instance = air.get("I", 0)
-        difference = self._recent("ARSP").get("DiffPress", 0.0) if instance == 0 else 0.0
+        instance, difference = air.get("I", 0), self._recent("ARSP").get("DiffPress")
+        if instance == 0 and difference is None:  # the other message cannot say that there is no pitot
+            self._teller.measure(0, ABSOLUTE_PRESSURE, abs_pressure=air["Press"] / 100)
+            return
         self._teller.tell(
             _PRESSURES[min(instance, 2)],
             time_boot_ms=self._teller.boot_ms,
             press_abs=air["Press"] / 100,
-            press_diff=difference / 100,
+            press_diff=difference / 100 if instance == 0 and difference is not None else 0.0,
             temperature=round(air.get("Temp", 0.0) * 100),
         )
 

@@ -64,7 +64,8 @@ def _of_tlog(path: Path, counters: Counter[str]) -> Iterator[tuple[int, bytes]]:
 
 
 def _dataflash(path: Path, sources: tuple[Source, ...]) -> Recording:
-    from adapters.dataflash import DataflashFrames, identity_of  # pymavlink's log tables take 0.2 s to load
+    from adapters.dataflash import DataflashFrames  # pymavlink's log tables take 0.2 s to load
+    from adapters.dataflash_identity import identity_of
 
     with path.open("rb") as file:
         identity = identity_of(file)

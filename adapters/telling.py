@@ -21,6 +21,11 @@ NO_UTC_US = 946_684_800 * 10**6  # 2000-01-01
 LEAST_UTC_US, GREATEST_UTC_US = 978_307_200 * 10**6, 4_102_444_800 * 10**6  # 2001, 2100
 FIXES_FOR_UTC = 31
 _SECOND_US = 10**6
+_HIGHRES = (
+    *(axis + kind for kind in ("acc", "gyro", "mag") for axis in "xyz"),
+    *("abs_pressure", "diff_pressure", "pressure_alt", "temperature"),
+)
+ACCELERATION, RATE, FIELD, ABSOLUTE_PRESSURE, TEMPERATURE = 0x7, 0x38, 0x1C0, 0x200, 0x1000  # of `updated`
 ARMED, _CUSTOM_MODE = 128, 1
 _ACTIVE, _STANDBY = 4, 3
 
@@ -108,6 +113,11 @@ class Teller:
         stamp = (self._now_us + (NO_UTC_US if offset_us is None else offset_us)) * 1000 // STEP_NS * STEP_NS
         self._last_stamp = max(stamp, self._last_stamp + STEP_NS)
         self.frames.append((self._last_stamp, frame))
+
+    def measure(self, sensor: int, updated: int, **values: float) -> None:
+        """A HIGHRES_IMU of the fields that `updated` says; all others are not a number."""
+        told = {**dict.fromkeys(_HIGHRES, math.nan), **values}
+        self.tell("HIGHRES_IMU", time_usec=self.boot_us, fields_updated=updated, id=sensor, **told)
 
     def take(self) -> list[tuple[int, bytes]]:
         """What was told since the last time."""
