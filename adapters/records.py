@@ -1,7 +1,7 @@
 """Where the records of a .tlog stand: {uint64 big-endian microseconds since 1970, MAVLink frame}, without index or checksum.
 
 In step, behind a record, the next one is taken where
-- its frame is good by its checksum; or
+- its frame is good by its checksum (of the first of all the stamp must be sane, too); or
 - its frame cannot be checked (unknown id, other definition), the stamp is sane and no good record begins within it; or
 - the stamp is sane and the file ends behind it, or a record follows whose checksum some definition could give: a frame that
   was damaged, but not in its length.
@@ -76,6 +76,8 @@ class _Walk:
         strong = self._sane & (self.frames.verdict == GOOD)
         self._strong = np.flatnonzero(strong)
         self._in_step = self._acceptable(len(data), last)
+        if is_first:  # nothing stands before it whose time it could take
+            self._in_step[:1] &= self._sane[:1]
         eligible = int(np.searchsorted(self._places, limit))
         self._strong = self._strong[: int(np.searchsorted(self._strong, eligible))]
         self.chosen = self._walk(limit, eligible)
@@ -140,13 +142,9 @@ def _candidates(block: Bytes, size: int, is_behind_record: bool) -> tuple[Places
     ends = np.zeros(size + 1, np.bool_)
     ends[0] = is_behind_record
     ends[frames.end[frames.fits]] = True
-    salvaged = np.flatnonzero(
-        ends[magic - 8] & (micros >= MICROSECONDS_2200)
-    )  # a stamp that was hit, its frame perhaps not
-    told = micros[sane].astype(np.int64)
-    if not len(salvaged):
-        return told, frames
-    places = np.concatenate((magic[sane], magic[salvaged]))
-    order = np.argsort(places)
-    told = np.concatenate((told, np.full(len(salvaged), -1)))
-    return told[order], headers(block, size, places[order])
+    if not (ends[magic - 8] & (micros >= MICROSECONDS_2200)).any():
+        return micros[sane].astype(np.int64), frames
+    # A stamp that was hit, its frame perhaps not: every place counts.
+    told = np.where(micros < MICROSECONDS_2200, micros, 0).astype(np.int64)
+    told[micros >= MICROSECONDS_2200] = -1
+    return told, headers(block, size, magic)
