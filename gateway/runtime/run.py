@@ -13,6 +13,7 @@ from pathlib import Path
 
 from adapters import Arrival, Source
 from adapters.decode import Decoder
+from adapters.signing import SigningGuard
 from gateway import __version__
 from gateway.observation import Heard
 from gateway.picture import Picture
@@ -44,7 +45,8 @@ class Run:
         self._first_at: int | None = None
         self._sources: dict[int, Source] = {}
         self._arrivals: dict[int, int] = {}
-        self._decoder = Decoder([], keys=setup.keys, live=setup.live)
+        signing = None if setup.signing_key is None else SigningGuard(setup.signing_key, setup.live)
+        self._decoder = Decoder([], keys=setup.keys, live=setup.live, signing=signing)
         self._state: State | None = None
         self._tally: Tally | None = None
         self._held: list[Heard] = []

@@ -43,6 +43,7 @@ class Setup:
     publish_system: int = 1  # the system, 1 to 255, whose ADS-B component we are there
     publish_leave_out: frozenset[str] = frozenset()  # aircraft ("mavlink:1") that are not told of
     keys: Mapping[int, bytes] = field(default_factory=dict)  # a radar's number -> its key
+    signing_key: bytes | None = field(default=None, repr=False)  # of MAVLink; None: frames are believed unchecked
     live: bool = False
     is_watched: bool = True  # False: drawn in large batches, for a replay as fast as it goes that nobody looks at
     name: str = ""  # of the session's folder; without one the site's
