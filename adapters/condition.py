@@ -81,12 +81,22 @@ def system_time(
     unix_usec, boot_ms = _read_system_time(payload)
     boot_ns = moments.boot(component, vehicle, boot_ms, received_at, counters)
     clock = component.clock
-    if boot_ns is None or not clock.set_utc(boot_ns, unix_usec * 1000):
+    if boot_ns is None:
         return ()
+    if not clock.set_utc(boot_ns, unix_usec * 1000):
+        counters["bad time"] += unix_usec >= _LEAST_UNIX_USEC  # less is no date at all: before the first fix
+        return ()
+    if clock.date_steps and not component.has_date_note:
+        component.has_date_note = True
+        text = f"{vehicle.name} has set its clock to another date: the session keeps the one that it began with."
+        moments.notes.append(("warning", text))
     utc = clock.utc(boot_ns)
     if utc is not None:
         moments.hear_utc(component.key, vehicle.name, utc, received_at, clock.speed.speed)
     return ()
+
+
+_LEAST_UNIX_USEC = 10**15
 
 
 def set_landed(vehicle: Vehicle, landed: str | None) -> None:

@@ -82,7 +82,7 @@ class Component:
     sequence: SequenceCheck = field(default_factory=SequenceCheck)
     rates: Rates = field(default_factory=Rates)
     reboots_told: int = 0
-    is_named_foreign: bool = False
+    has_date_note: bool = False
     linked_to: Vehicle | None = None  # whose other links' clocks this one knows
 
     def take_role(self, kind: int, autopilot: int) -> None:
