@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from gateway.observation import Timing
-from gateway.runtime.survey import AircraftSeen, RadarSeen, Survey
+from gateway.runtime.survey import AircraftSeen, RadarSeen, Stream, Survey
 
 _LOSSY = 0.01  # a share of frames lost that a person should know of
 _SILENT_NS = 5_000_000_000  # tracks coast after 2 s and are worth little after 5
@@ -33,37 +33,65 @@ def findings(found: Survey) -> list[Finding]:
 
 def _of_aircraft(found: Survey) -> Iterator[Finding]:
     for name, seen in sorted(found.aircraft.items()):
-        if not seen.reports.count:
-            if name.startswith("mavlink:"):
-                why = _refusals(found)
-                yield Finding("missing", f"{name} tells no position that can be used{why}: it will not be drawn.")
-            continue
-        reports = seen.reports
-        yield Finding("good", f"{name}: {reports.count} positions, {reports.rate_hz:.1f}/s; a track.")
-        yield from _of_time(seen)
-        if reports.longest_gap_ns >= _SILENT_NS and name.startswith("mavlink:"):
-            gap_s, since_s = reports.longest_gap_ns / 1e9, (reports.gap_at - found.began) / 1e9
-            yield Finding(
-                "wrong", f"{name} tells no position for {gap_s:.1f} s from second {since_s:.0f}: it coasts there."
-            )
-        if not seen.with_accuracy:
-            yield Finding(
-                "missing", f"{name} does not say how accurate its positions are: [position] of the site file must."
-            )
-        if not seen.with_height:
-            yield Finding("missing", f"{name} tells only pressure altitudes: its height is not known without a radar.")
-        elif not seen.with_ellipsoid_height and found.place and not found.place.site.runway.geoid_separation_m:
-            yield Finding(
-                "missing",
-                f"{name} tells altitudes above mean sea level only: set geoid_separation_m in the site file, or heights "
-                "above the ellipsoid are wrong by as much.",
-            )
-        if name.startswith("mavlink:") and not seen.kinds["Attitude"]:
-            yield Finding("missing", f"{name} tells no attitude: it is drawn along its course.")
-        if seen.kinds["Truth"]:
-            yield Finding("good", f"{name} comes with a simulator's truth: tracks are scored against it.")
-        if seen.plan_points > 1:
-            yield Finding("good", f"{name} has told a plan of {seen.plan_points} points.")
+        if name.startswith("mavlink:"):
+            yield from _of_vehicle(found, seen)
+    traffic = [seen for name, seen in found.aircraft.items() if not name.startswith("mavlink:")]
+    if traffic:
+        together = _together(traffic)
+        yield Finding("good", f"{together.name}: {together.reports.count} positions; a track for each.")
+        yield from _of_reports(together)
+
+
+def _of_vehicle(found: Survey, seen: AircraftSeen) -> Iterator[Finding]:
+    name, reports = seen.name, seen.reports
+    if not reports.count:
+        yield Finding("missing", f"{name} tells no position that can be used{_refusals(found)}: it will not be drawn.")
+        return
+    yield Finding("good", f"{name}: {reports.count} positions, {reports.rate_hz:.1f}/s; a track.")
+    yield from _of_reports(seen)
+    if reports.longest_gap_ns >= _SILENT_NS:
+        gap_s, since_s = reports.longest_gap_ns / 1e9, (reports.gap_at - found.began) / 1e9
+        yield Finding(
+            "wrong", f"{name} tells no position for {gap_s:.1f} s from second {since_s:.0f}: it coasts there."
+        )
+    if seen.with_height and not seen.with_ellipsoid_height and not _has_geoid(found):
+        yield Finding(
+            "missing",
+            f"{name} tells altitudes above mean sea level only: set geoid_separation_m in the site file, or heights above the "
+            "ellipsoid are wrong by as much.",
+        )
+    if not seen.kinds["Attitude"]:
+        yield Finding("missing", f"{name} tells no attitude: it is drawn along its course.")
+    if seen.kinds["Truth"]:
+        yield Finding("good", f"{name} comes with a simulator's truth: tracks are scored against it.")
+    if seen.plan_points > 1:
+        yield Finding("good", f"{name} has told a plan of {seen.plan_points} points.")
+
+
+def _of_reports(seen: AircraftSeen) -> Iterator[Finding]:
+    """What positions carry, and what not."""
+    yield from _of_time(seen)
+    if not seen.with_accuracy:
+        yield Finding("missing", f"{seen.name}: no position says how accurate it is; [position] of the site file must.")
+    if not seen.with_height:
+        yield Finding("missing", f"{seen.name}: only pressure altitudes; without a radar the height is not known.")
+
+
+def _together(traffic: Sequence[AircraftSeen]) -> AircraftSeen:
+    """Other aircraft as one: there can be hundreds."""
+    names = sorted(seen.name for seen in traffic)
+    shown = ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
+    together = AircraftSeen(f"Traffic of {len(names)} ({shown})", Stream("positions"))
+    for seen in traffic:
+        together.reports.count += seen.reports.count
+        together.timings += seen.timings
+        together.with_accuracy += seen.with_accuracy
+        together.with_height += seen.with_height
+    return together
+
+
+def _has_geoid(found: Survey) -> bool:
+    return found.place is None or bool(found.place.site.runway.geoid_separation_m)
 
 
 def _of_time(seen: AircraftSeen) -> Iterator[Finding]:
@@ -129,8 +157,8 @@ def _of_links(found: Survey) -> Iterator[Finding]:
             late = ", some too late to be used" if vehicle.delay_99_s > _HISTORY_S else ""
             yield Finding(
                 "wrong",
-                f"{name}: its link holds frames back, {vehicle.delay_s:.2f} s in the median and {vehicle.delay_99_s:.1f} s for 1 in "
-                f"100{late}; they are placed by the vehicle's own clock.",
+                f"{name}: its link holds frames back, {vehicle.delay_s:.2f} s in the median and {vehicle.delay_99_s:.1f} s for "
+                f"one in a hundred{late}; they are placed by the vehicle's own clock.",
             )
 
 
