@@ -33,6 +33,11 @@ _LARGEST_SEPARATION_MM = 150_000
 _NO_ORIGIN_MM = 100_000  # estimate and receiver further apart in altitude: the estimator has no origin yet
 _NO_HOME_MM = 15_000  # and also when nearer, where the altitude above home is the altitude itself
 _REMEMBERED = 64
+_STILL_COMES = (
+    "",
+    "repeated",
+    "no fix",
+)  # refused so, a kind is still the one to wait for; so is an estimate in any case
 
 Sigmas = tuple[float | None, float | None, float | None]
 
@@ -62,7 +67,8 @@ class Fixes:
     _usec: int = 0
     _ellipsoid_given: bool = False
     _has_origin: bool = False
-    _came: list[int | None] = field(default_factory=lambda: [None] * len(KINDS))  # `now`, by kind
+    _best: int = len(KINDS)  # the best kind of position that has lately come
+    _best_came: int = 0  # `now`, when it last did
     _newest: list[tuple[int, ...]] = field(default_factory=lambda: [()] * len(KINDS))
     _recent: list[deque[tuple[int, ...]]] = field(
         default_factory=lambda: [deque(maxlen=_REMEMBERED) for _ in KINDS],
@@ -87,7 +93,7 @@ class Fixes:
 
     def yields(self, kind: int, now: int) -> bool:
         """Whether a better kind of position has lately come."""
-        return any(came is not None and abs(now - came) < _SLOWEST_POSITION_NS for came in self._came[:kind])
+        return kind > self._best and abs(now - self._best_came) < _SLOWEST_POSITION_NS
 
     def refuses(
         self,
@@ -104,14 +110,12 @@ class Fixes:
         `key` is the same for a position that is told again; `place` in degE7; `altitudes_mm`, where an estimator tells
         both: above mean sea level and above home.
         """
-        if kind == ESTIMATE:  # told or not, where it comes the others are not asked
-            self._came[kind] = now
         if self.yields(kind, now):
             self.counters["better position kind is used"] += 1
             return True
         reason = self._refusal(kind, key, place, needs_fix, altitudes_mm)
-        if reason in ("", "repeated", "no fix"):
-            self._came[kind] = now
+        if kind == ESTIMATE or reason in _STILL_COMES:
+            self._best, self._best_came = kind, now
         if not reason:
             self.last_report, self.reason = now, ""
             return False
@@ -136,7 +140,7 @@ class Fixes:
     def reboot(self) -> None:
         """The vehicle has started anew: its estimator has no origin, its times repeat."""
         self._has_origin, self._fix = False, None
-        self._came = [None] * len(KINDS)
+        self._best = len(KINDS)
         self._newest = [()] * len(KINDS)
         for recent in self._recent:
             recent.clear()

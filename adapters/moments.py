@@ -80,8 +80,10 @@ class Moments:
         clock = component.clock
         if usec >= _LEAST_UNIX_USEC or not clock.has_been_heard():
             return None
-        newest = clock.boot_at(received_at)
-        apart = (usec * 1000 - newest + _WRAP_NS // 2) % _WRAP_NS - _WRAP_NS // 2
+        boot_ns, newest = usec * 1000, clock.boot_at(received_at)
+        if abs(boot_ns - newest) <= _STRAY_NS:
+            return boot_ns
+        apart = (boot_ns - newest + _WRAP_NS // 2) % _WRAP_NS - _WRAP_NS // 2  # one of them has wrapped
         return newest + apart if abs(apart) <= _STRAY_NS else None
 
     def told(

@@ -39,6 +39,14 @@ _CUT_OFF = 32767
 _ACCELERATION, _RATE, _FIELD, _ABSOLUTE, _DIFFERENTIAL = 0x7, 0x38, 0x1C0, 0x200, 0x400
 _GREATEST = 1e6  # no sensor's acceleration, rate or field
 
+_NAMES = tuple(  # of what people are shown, by sensor
+    tuple(
+        f"{name}{which}, {unit}"
+        for name, unit in (("acceleration", "m/s2"), ("turn rate", "rad/s"), ("field", "gauss"))
+    )
+    for which in ("", *(f" of sensor {number}" for number in range(2, 9)), " of sensor 9 or more")
+)
+
 Vector = tuple[float, float, float]
 _NOTHING: Vector = (0.0, 0.0, 0.0)
 
@@ -186,9 +194,16 @@ def _scaled(
     vehicle: Vehicle, sensor: int, axes: list[int], when: When, received_at: int, counters: Counter[str]
 ) -> Observations:
     """A sample in mG, mrad/s and mgauss."""
-    acceleration = _integers(axes[0:3], _MILLI_G, counters)
-    rate = _integers(axes[3:6], 1e-3, counters)
-    magnetic = _integers(axes[6:9], 1e-3, counters)
+    ax, ay, az, gx, gy, gz, mx, my, mz = axes
+    acceleration: Vector | None = (ax * _MILLI_G, ay * _MILLI_G, az * _MILLI_G)
+    rate: Vector | None = (gx / 1000, gy / 1000, gz / 1000)
+    magnetic: Vector | None = (mx / 1000, my / 1000, mz / 1000)
+    if max(axes) >= _CUT_OFF or min(axes) <= -_CUT_OFF:
+        counters["inertial out of range"] += 1
+        cut = [max(map(abs, axes[first : first + 3])) >= _CUT_OFF for first in (0, 3, 6)]
+        acceleration, rate, magnetic = (
+            None if is_cut else told for is_cut, told in zip(cut, (acceleration, rate, magnetic), strict=True)
+        )
     if acceleration == _NOTHING:
         acceleration, rate = None, None if rate == _NOTHING else rate
     if magnetic == _NOTHING:
@@ -199,21 +214,13 @@ def _scaled(
     return (_sample(vehicle, sensor, [acceleration, rate, magnetic], when, received_at),)
 
 
-def _integers(axes: list[int], unit: float, counters: Counter[str]) -> Vector | None:
-    x, y, z = axes
-    if max(x, y, z) >= _CUT_OFF or min(x, y, z) <= -_CUT_OFF:
-        counters["inertial out of range"] += 1
-        return None
-    return x * unit, y * unit, z * unit
-
-
 def _sample(vehicle: Vehicle, sensor: int, vectors: list[Vector | None], when: When, received_at: int) -> ImuSample:
     acceleration, rate, magnetic = vectors
-    number = "" if sensor == 1 else f" {sensor}"
+    readings, names = vehicle.readings, _NAMES[min(sensor, len(_NAMES)) - 1]
     if acceleration is not None:
-        vehicle.readings[f"acceleration{number}, m/s2"] = math.hypot(*acceleration)
+        readings[names[0]] = math.hypot(*acceleration)
     if rate is not None:
-        vehicle.readings[f"turn rate{number}, degrees/s"] = math.degrees(math.hypot(*rate))
+        readings[names[1]] = math.hypot(*rate)
     if magnetic is not None:
-        vehicle.readings[f"magnetic field{number}, gauss"] = math.hypot(*magnetic)
+        readings[names[2]] = math.hypot(*magnetic)
     return ImuSample(vehicle.name, when[0], received_at, sensor, acceleration, rate, magnetic)
