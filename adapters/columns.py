@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.framing import GOOD, VERDICTS, Bytes, rows
+from adapters.framing import GOOD, VERDICTS, Bytes, windows
 from adapters.mavlink_frames import definitions, message_name
 from adapters.records import Records, read_records
 from adapters.tlog import stamped
@@ -30,27 +30,23 @@ BLOCK_BYTES = 64 << 20
 FRAME = np.dtype(
     [
         ("received_at", "<i8"),  # ns since 1970 UTC
-        ("offset", "<i8"),  # of the frame in the file
-        ("message", "<u4"),
-        ("length", "u1"),  # of the payload as it was sent
         ("system", "u1"),
         ("component", "u1"),
         ("sequence", "u1"),
         ("version", "u1"),
         ("signed", "?"),
+        ("length", "u1"),  # of the payload as it was sent
         ("verdict", "u1"),  # index into VERDICTS
         ("outgoing", "?"),  # sent by the ground station that recorded the file
+        ("offset", "<i8"),  # of the frame in the file
+        ("message", "<u4"),
+        ("gap", "V4"),
     ]
 )
-_HEAD = [
-    ("received_at", "<i8"),
-    ("system", "u1"),
-    ("component", "u1"),
-    ("sequence", "u1"),
-    ("version", "u1"),
-    ("signed", "?"),
-]
+# A row of a message begins with the same 16 bytes as a frame's, so that they are copied at once; these are named in it.
+_HEAD = ("received_at", "system", "component", "sequence", "version", "signed")
 _BODY_AT = 16  # of a row: where the payload begins
+_HEAD_BYTES = np.dtype([("head", f"V{_BODY_AT}"), ("rest", f"V{FRAME.itemsize - _BODY_AT}")])
 _TYPES = {
     "char": "S1",
     "float": "<f4",
@@ -90,12 +86,10 @@ def message_dtype(number: int) -> np.dtype[Any]:
             one = np.dtype(_TYPES[kinds[name]])
             formats[name] = np.dtype((one, (repeats,))) if repeats else one
         places[name], place = place, place + formats[name].itemsize
-    head = np.dtype(_HEAD)
-    taken = head.names or ()
     return np.dtype(
         {
-            "names": [*taken, *(f"{name}_" if name in taken else name for name in message.fieldnames)],
-            "formats": [*(head[name] for name in taken), *(formats[name] for name in message.fieldnames)],
+            "names": [*_HEAD, *(f"{name}_" if name in _HEAD else name for name in message.fieldnames)],
+            "formats": [*(FRAME[name] for name in _HEAD), *(formats[name] for name in message.fieldnames)],
             "offsets": [*range(0, 1), *range(8, 13), *(places[name] for name in message.fieldnames)],
             "itemsize": place,
         }
@@ -158,34 +152,35 @@ class _Kinds:
 
 def _columns(records: Records, told: NDArray[np.int64], outgoing: NDArray[np.bool_], kinds: _Kinds) -> Columns:
     frames = records.frames
-    table = np.empty(len(told), FRAME)
+    table = np.zeros(len(told), FRAME)
     table["received_at"], table["outgoing"] = told, outgoing
     table["offset"] = frames.start + records.offset
     for name in ("message", "length", "system", "component", "sequence", "version", "signed", "verdict"):
         table[name] = getattr(frames, name)
     kind = np.where((frames.verdict == GOOD) & ~outgoing, kinds.of_message(frames.message), -1).astype(np.int16)
-    order, payload = np.argsort(kind, kind="stable"), frames.payload
+    order = np.argsort(kind, kind="stable")
     bounds = np.searchsorted(kind[order], np.arange(len(kinds.ids) + 1))
+    heads, payloads, lengths = table.view(_HEAD_BYTES)["head"][order], frames.payload[order], frames.length[order]
     messages = {}
     for index in np.flatnonzero(np.diff(bounds)).tolist():
-        some = order[bounds[index] : bounds[index + 1]]
+        some = slice(bounds[index], bounds[index + 1])
         dtype = message_dtype(kinds.ids[index])
-        messages[kinds.names[index]] = _unpacked(records.bytes, payload[some], table[some], dtype)
+        messages[kinds.names[index]] = _unpacked(records.bytes, heads[some], payloads[some], lengths[some], dtype)
     return Columns(messages, table)
 
 
-def _unpacked(block: Bytes, payload: NDArray[np.int64], heads: Structured, dtype: np.dtype[Any]) -> Structured:
+def _unpacked(
+    block: Bytes, heads: Structured, payloads: NDArray[np.int64], lengths: Bytes, dtype: np.dtype[Any]
+) -> Structured:
     size = dtype.itemsize - _BODY_AT
-    body = rows(block, payload, size)
-    short = np.flatnonzero(heads["length"] < size)
+    found = np.empty(len(payloads), [("head", f"V{_BODY_AT}"), ("body", f"V{size}")])
+    found["head"] = heads
+    found["body"] = windows(block, size)[payloads]
+    short = np.flatnonzero(lengths < size)
     if len(short):
-        body[short] *= np.arange(size) < heads["length"][short, None]
-    found = np.zeros(len(payload), dtype)
-    raw = found.view(np.uint8).reshape(len(payload), dtype.itemsize)
-    raw[:, _BODY_AT:] = body
-    for name, _ in _HEAD:
-        found[name] = heads[name]
-    return found
+        raw = found.view(np.uint8).reshape(len(payloads), dtype.itemsize)
+        raw[short, _BODY_AT:] *= np.arange(size, dtype=np.uint8) < lengths[short, None]
+    return found.view(dtype)
 
 
 def _joined(parts: list[Columns]) -> Columns:

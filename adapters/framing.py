@@ -111,10 +111,14 @@ def headers(block: Bytes, size: int, start: Places) -> Headers:
     return Headers(start, end, fits, version, length, signed, sequence, system, component, message, verdict)
 
 
+def windows(block: Bytes, width: int) -> NDArray[np.void]:
+    """`width` bytes from every place on, as one void element each; a view."""
+    return np.ndarray(len(block) - width + 1, np.dtype((np.void, width)), block, strides=(1,))
+
+
 def rows(block: Bytes, start: Places, width: int) -> Bytes:
     """`width` bytes from each place on, (places, width)."""
-    windows = np.ndarray(len(block) - width + 1, np.dtype((np.void, width)), block, strides=(1,))
-    return windows[start].view(np.uint8).reshape(len(start), width)
+    return windows(block, width)[start].view(np.uint8).reshape(len(start), width)
 
 
 def _verdicts(block: Bytes, start: Places, size: Places, message: NDArray[np.uint32]) -> Bytes:
@@ -149,5 +153,5 @@ def _by_columns(cut: Bytes, words: NDArray[np.uint16], crc: NDArray[np.uint16]) 
     longest = int(words[0]) if len(words) else 0
     going_on = np.searchsorted(-words.astype(np.int32), -np.arange(longest), side="left")
     for column, many in zip(columns, going_on.tolist(), strict=False):
-        crc[:many] = TWO_BYTES[crc[:many] ^ column[:many]]
+        crc[:many] = TWO_BYTES.take(crc[:many] ^ column[:many])
     return crc

@@ -24,7 +24,7 @@ from adapters.framing import BAD_CHECKSUM, DIFFERS, GOOD, UNKNOWN_ID, Bytes, Hea
 from adapters.mavlink_frames import LONGEST, V2
 
 MICROSECONDS_2200 = 7_258_118_400 * 10**6
-_BLOCK = 1 << 20
+_BLOCK = 1 << 21
 _AHEAD = 2 * (8 + LONGEST) + 9  # what must be known behind a record's beginning to judge it
 
 
@@ -105,21 +105,20 @@ class _Walk:
         places, ends, accepted = self._places, self.frames.end, self._in_step
         follows = (places[1:eligible] == ends[: max(eligible - 1, 0)]) & accepted[1:eligible]
         breaks = [*np.flatnonzero(~follows).tolist(), eligible - 1]
-        strong = self._strong.tolist()
-        strong_places = places[self._strong].tolist()
+        strong_places = places[self._strong]
         runs: list[NDArray[np.int64]] = []
         while self.at < limit:
             index = int(np.searchsorted(places[:eligible], self.at))
             if not (self.in_step and index < eligible and places[index] == self.at and accepted[index]):
-                known = bisect_left(strong_places, self.at + self.in_step)
-                self.in_step = known < len(strong)
-                goal = strong_places[known] if self.in_step else limit
+                known = int(np.searchsorted(strong_places, self.at + self.in_step))
+                self.in_step = known < len(strong_places)
+                goal = int(strong_places[known]) if self.in_step else limit
                 if not self.in_step:
                     self.trailing = goal - self.at
                     self.at = goal
                     break
                 self.skipped += goal - self.at
-                index = strong[known]
+                index = int(self._strong[known])
             stop = breaks[bisect_left(breaks, index)]
             runs.append(np.arange(index, stop + 1))
             self.at = int(ends[stop])

@@ -22,12 +22,13 @@ _QUIET_ENVIRONMENT: Mapping[str, str] = {"RERUN_ANALYTICS": "0", "NO_COLOR": "1"
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """One measured quantity: the median of some samples, and what it should be at most."""
+    """One measured quantity: the median of some samples, and what it should be at most, or at least."""
 
     name: str
     unit: str
     samples: tuple[float, ...]
     at_most: float | None = None
+    at_least: float | None = None
 
     @property
     def median(self) -> float:
@@ -37,7 +38,16 @@ class Figure:
     @property
     def holds(self) -> bool | None:
         """Whether the median keeps to the target; None without one."""
+        if self.at_least is not None:
+            return self.median >= self.at_least
         return None if self.at_most is None else self.median <= self.at_most
+
+    @property
+    def target(self) -> str:
+        """The target as it reads in a table; empty without one."""
+        if self.at_least is not None:
+            return f"≥ {self.at_least:g} {self.unit}".rstrip()
+        return "" if self.at_most is None else f"≤ {self.at_most:g} {self.unit}".rstrip()
 
     def document(self) -> dict[str, Any]:
         """As plain values for JSON."""

@@ -235,7 +235,7 @@ def _peak(file: Any, block_bytes: int) -> tuple[int, int]:
 
 def test_in_blocks_a_file_of_any_length_takes_the_memory_of_one_block() -> None:
     part = EXCERPT.read_bytes()
-    many = 12 * (1 << 20) // len(part)
+    many = 20 * (1 << 20) // len(part)
     short, long = (_peak(_Repeated(part, times), 1 << 20) for times in (many // 4, many))
     assert long[0] > 3 * short[0]
     assert long[1] < 1.5 * short[1]  # a file that was held would take four times as much
@@ -244,7 +244,7 @@ def test_in_blocks_a_file_of_any_length_takes_the_memory_of_one_block() -> None:
 
 def test_blocks_end_to_end_are_the_whole() -> None:
     def file() -> BinaryIO:
-        return io.BytesIO(EXCERPT.read_bytes() * 8)
+        return io.BytesIO(EXCERPT.read_bytes() * 20)
 
     blocks, whole = list(iter_columns(file(), block_bytes=1 << 20)), read_columns(file())
     assert len(blocks) > 1
