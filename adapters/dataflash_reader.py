@@ -20,14 +20,15 @@ from typing import Any, BinaryIO, NamedTuple
 
 from pymavlink.DFReader import FORMAT_TO_STRUCT
 
+from adapters.telling import LONGEST_US
+
 HEADER = b"\xa3\x95"
 _FMT = 0x80
 _FMT_SIZE = 89
 _LONGEST = 255
 _BLOCK = 1 << 20
 _TEXTS = ("Name", "Message")  # all other wanted columns are numbers; a column that is not what it should be is left out
-_JUMP_US = 600 * 10**6  # a time further than this from the one before is damage, unless the next one agrees
-_LONGEST_US = 10**14  # three years since boot
+_JUMP_US = 3600 * 10**6  # a time further than this from the one before is damage, unless the next one agrees
 _MOMENT_AT_MOST = 4096  # entries
 
 Values = dict[str, Any]
@@ -81,7 +82,7 @@ class DataflashReader:
                 self.counters["bad timestamps"] += 1
 
     def _is_sane(self, time_us: int) -> bool:
-        if not 0 <= time_us < _LONGEST_US:
+        if not 0 <= time_us < LONGEST_US:
             return False
         if self._last_us >= 0 and abs(time_us - self._last_us) > _JUMP_US:
             agrees = self._suspect_us >= 0 and abs(time_us - self._suspect_us) <= _JUMP_US

@@ -20,6 +20,7 @@ STEP_NS = 4_000
 NO_UTC_US = 946_684_800 * 10**6  # 2000-01-01
 LEAST_UTC_US, GREATEST_UTC_US = 978_307_200 * 10**6, 4_102_444_800 * 10**6  # 2001, 2100
 FIXES_FOR_UTC = 31
+LONGEST_US = 10**14  # three years since boot: later is damage
 _SECOND_US = 10**6
 _HIGHRES = (
     *(axis + kind for kind in ("acc", "gyro", "mag") for axis in "xyz"),

@@ -28,6 +28,7 @@ from typing import Any
 
 from adapters.telling import (
     FIXES_FOR_UTC,
+    LONGEST_US,
     Identity,
     Teller,
     utc_offset_us,
@@ -111,7 +112,7 @@ class UlogFrames:
     def frames(self, counters: Counter[str]) -> Iterator[tuple[int, bytes]]:
         """Stamp (ns since 1970 UTC, strictly increasing multiples of 4000) and frame.
 
-        Counters: "values not usable", "damaged parts".
+        Counters: "values not usable", "bad timestamps", "damaged parts".
         """
         if self._is_damaged:
             counters["damaged parts"] += 1
@@ -119,6 +120,9 @@ class UlogFrames:
         names = list(self._topics)
         merged = heapq.merge(*(self._entries(name) for name in names), key=lambda entry: entry[:2])
         for at_us, order, values in merged:
+            if at_us >= LONGEST_US:
+                counters["bad timestamps"] += 1
+                continue
             yield from teller.hear(at_us, names[order], values)
 
 

@@ -71,6 +71,8 @@ def test_a_session_is_a_folder_with_session_json(tmp_path: Path) -> None:
         (b'{"mission": [1, 2, 3], "version": 1}', "JSON"),
         (bytes(range(256)) * 8, "not a recording"),
         (_mavlink() * 5, "MAVLink frames without times"),
+        (b"\x1f\x8b\x08" + bytes(100), "gzip: unpack it first"),
+        (b"FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n" * 9, "give the .BIN"),
     ],
 )
 def test_what_is_no_recording_is_said_in_one_sentence(tmp_path: Path, content: bytes, expected: str) -> None:
@@ -95,6 +97,15 @@ def test_other_logs_are_known_by_their_first_bytes(tmp_path: Path) -> None:
         path = tmp_path / kind
         path.write_bytes(beginning + bytes(64))
         assert kind_of(path) == kind
+
+
+def test_mission_files_are_known_and_are_no_recordings(tmp_path: Path) -> None:
+    for content, kind in ((b"QGC WPL 110\n", "waypoints"), (b'{\n "fileType": "Plan",\n "version": 1}', "plan")):
+        path = tmp_path / "mission.tlog"
+        path.write_bytes(content)
+        assert kind_of(path) == kind
+        with pytest.raises(FileError, match="mission file"):
+            open_recording(path)
 
 
 def test_a_tlog_is_one_source_with_increasing_stamps() -> None:

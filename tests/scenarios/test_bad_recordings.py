@@ -21,7 +21,7 @@ Talkdown = Callable[..., Any]
         (b"", "is empty"),
         (b"time,latitude,longitude\n1,2,3\n4,5,6\n", "text file"),
         (bytes(range(256)) * 40, "not a recording"),
-        (b"\x89PNG\r\n\x1a\n" + bytes(500), "not a recording"),
+        (b"\x89PNG\r\n\x1a\n" + bytes(500), "a picture"),
     ],
 )
 def test_a_file_that_is_no_recording_is_refused_in_one_sentence(
