@@ -121,6 +121,18 @@ def read_keys(place: Place | None, site_path: Path | None) -> dict[int, bytes]:
     return keys
 
 
+def read_signing_key(path: Path | None) -> bytes | None:
+    """The MAVLink signing key of a key file. Raises UsageError."""
+    if path is None:
+        return None
+    from adapters.signing import SigningKeyError, read_key
+
+    try:
+        return read_key(path)
+    except SigningKeyError as error:
+        raise UsageError(str(error)) from error
+
+
 def read_urls(texts: list[str], default_port: int) -> list[Url]:
     """The links that the texts describe. Raises UsageError."""
     from gateway.runtime.urls import LinkError, parse_url

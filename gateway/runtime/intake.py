@@ -17,6 +17,7 @@ from adapters.mavlink_frames import FrameScanner
 from gateway.runtime.allowed import Allowed
 from gateway.runtime.links import Chunks
 from gateway.runtime.stamps import Stamper
+from gateway.runtime.told_plans import TOLD
 
 PEERS_AT_MOST = 128  # a session's MAVLink peers; more are counted and not heard
 _STRANGERS_AT_MOST = 64  # peers that have not sent a whole frame yet; the one silent for longest makes room
@@ -65,6 +66,7 @@ class Intake:
         }
         self._unannounced = list(self._radars.values())
         self._next_number = len(self._radars)
+        self._told: Source | None = None
         self._peers: list[dict[str, _Peer]] = [{} for _ in self._origins]
         self._strangers: dict[tuple[int, str], _Peer] = {}
         self._reached: dict[int, tuple[int, str]] = {}
@@ -109,6 +111,17 @@ class Intake:
                 names.append("")
         stamps = self._stamper.stamps(instants)
         return sources, list(map(_ARRIVAL, zip(stamps, numbers, contents, names, strict=True)))
+
+    def tell(self, lines: Sequence[bytes]) -> tuple[list[Source], list[Arrival]]:
+        """What people told the gateway: its source, if it is the first time, and the lines as arrivals of now."""
+        new = []
+        if self._told is None:
+            self._told = Source(self._next_number, "told", TOLD, "the command line")
+            self._next_number += 1
+            new.append(self._told)
+        number = self._told.number
+        stamps = self._stamper.stamps([self._stamper.now()] * len(lines))
+        return new, [Arrival(stamp, number, line) for stamp, line in zip(stamps, lines, strict=True)]
 
     def _in_order(self, heard: Sequence[tuple[int, Chunks]]) -> Iterable[tuple[int, int, str, bytes, int | None]]:
         """(heard at, link, peer, data, stream) over all links by time; what one link says keeps its order whatever its

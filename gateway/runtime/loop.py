@@ -48,14 +48,18 @@ def run_live(
     no_place_after_s: float = _NO_PLACE_AFTER_S,
     allowed: Allowed | None = None,
     manners: Manners | None = None,
+    told: Sequence[bytes] = (),
 ) -> Summary:
     """Fuse what open links bring until asked to stop, or for so many seconds; closes the links.
 
-    `allowed`: who may be heard; None: everybody. `manners`: what may be sent on the MAVLink links; None: nothing.
+    `allowed`: who may be heard; None: everybody. `manners`: what may be sent on the MAVLink links; None: nothing. `told`:
+    what the gateway is told at the start (adapters/told.py).
 
     Raises RunFailure when the archive cannot be written, or the stream does not tell where we are.
     """
     receiver = Receiver(mavlink, radar, allowed=allowed)
+    for line in told:
+        receiver.tell(line)
     try:
         run = Run(setup, receiver.started_at)
         with _Abandoning(run), UnhurriedCollection() as collection:

@@ -62,6 +62,7 @@ class Receiver:
         self._has_heard = False
         self._outbox: deque[tuple[int, bytes]] = deque()
         self._unsent: Counter[str] = Counter()
+        self._told: deque[bytes] = deque()
         self._new_sources: list[Source] = []
         self._arrivals: list[Arrival] = []
         self._notes: list[tuple[str, str]] = []
@@ -101,6 +102,10 @@ class Receiver:
         self._outbox.append((source, data))
         return True
 
+    def tell(self, line: bytes) -> None:
+        """Take in what a person told the gateway, one JSON object, as if it had just come in; any thread may."""
+        self._told.append(line)
+
     def counters(self) -> dict[str, int]:
         """Everything that was lost or odd before decoding, by link and reason."""
         counted: Counter[str] = Counter()
@@ -134,6 +139,9 @@ class Receiver:
         count = sum(len(chunks.data) for _, chunks in heard)
         self._has_heard = count > 0
         sources, arrivals = self._intake.take(heard)
+        if self._told:
+            told_by, told = self._intake.tell([self._told.popleft() for _ in range(len(self._told))])
+            sources, arrivals = [*sources, *told_by], [*arrivals, *told]
         notes = [note for link in self._links for note in link.news]
         for link in self._links:
             link.news.clear()

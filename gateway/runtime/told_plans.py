@@ -10,7 +10,7 @@ from pathlib import Path
 from adapters import Arrival, Source
 from adapters.kinds import FileError
 from adapters.mission_files import MissionFileError, read_mission
-from adapters.told import encode_plan
+from adapters.told import ANYBODY, encode_plan
 
 TOLD = "commands"  # the source of what people tell, and its file's stem in a session
 
@@ -18,13 +18,18 @@ Missions = Sequence[tuple[str | None, Path]]
 """Mission files, each with its aircraft ("mavlink:2"); None: of the only vehicle."""
 
 
-def told_plan(path: Path, aircraft: str, source: int, stamp: int) -> Arrival:
-    """A mission file as what is told by a source at a stamp. Raises FileError for a file that cannot be used."""
+def told_line(path: Path, aircraft: str | None) -> bytes:
+    """A mission file as a told line, of an aircraft or of the first one heard. Raises FileError for what is no such file."""
     try:
         points = read_mission(path)
     except MissionFileError as error:
         raise FileError(str(error)) from error
-    return Arrival(stamp, source, encode_plan(aircraft, points))
+    return encode_plan(aircraft or ANYBODY, points)
+
+
+def told_plan(path: Path, aircraft: str, source: int, stamp: int) -> Arrival:
+    """The same as told by a source at a stamp."""
+    return Arrival(stamp, source, told_line(path, aircraft))
 
 
 def told_source(number: int, missions: Missions) -> Source:
