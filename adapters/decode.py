@@ -87,6 +87,11 @@ class Decoder:
         self._mavlink.origins[source.number] = source.origin
 
     @property
+    def wanted(self) -> frozenset[int]:
+        """The MAVLink messages that say something here; all others are only counted."""
+        return self._wanted
+
+    @property
     def epoch_offset_s(self) -> int | None:
         """The session's epoch offset in whole seconds; None as long as no source's clock has settled."""
         return self._epoch.offset_s
@@ -104,13 +109,12 @@ class Decoder:
         listened = self._listened[number]
         listened.last_heard = received_at
         self.refused = None
-        kind = listened.source.kind
-        settled = self._epoch.offset_s is not None
+        kind, settled = listened.source.kind, self._epoch.offset_s is not None
         if kind == "mavlink":
             if self._signing is not None and not self._believes(arrival, listened):
-                return self._heard(received_at, ())
+                return self._only_notes(received_at)
             if listened.passes(data, self._wanted, received_at):
-                return None if not self._notes else self._heard(received_at, ())
+                return self._only_notes(received_at) if self._notes else None
             found = self._hear_mavlink(arrival, listened)
         else:
             found = self._hear_radar(arrival, listened) if kind == "radar" else self._hear_told(arrival, listened)
@@ -151,10 +155,8 @@ class Decoder:
             if total
         }
 
-    def _heard(self, received_at: int, found: Observations) -> Heard | None:
-        if not found and not self._notes:
-            return None
-        return Heard(self._epoch.session_time(received_at), found, self._say())
+    def _only_notes(self, received_at: int) -> Heard | None:
+        return Heard(self._epoch.session_time(received_at), (), self._say()) if self._notes else None
 
     def _say(self) -> tuple[tuple[str, str], ...]:
         if not self._notes:

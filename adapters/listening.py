@@ -20,7 +20,6 @@ from gateway.picture import SourceHealth
 
 _RATE_S = 10
 _HEADER = struct.Struct("<BBBxBBBHB").unpack_from
-_RECENT = (1 << 57) - 1
 _EXTRA = {number: message.crc_extra for number, message in definitions().items()}
 
 
@@ -50,15 +49,13 @@ class Listened:
         crc = mcrf4xx(frame[1:-2])
         if CRC_WORDS[crc & 255 ^ extra] ^ crc >> 8 != frame[-2] | frame[-1] << 8:
             return False
-        counters, check = self.counters, component.sequence
-        counters["frames"] += 1
+        self.counters["frames"] += 1
         self.known_good.add(message)
-        if check.last >= 0 and sequence == check.last + 1:
-            check.last, check.message, check.moved = sequence, message, True
-            check.recent = (check.recent << 1 | 1) & _RECENT
-        else:
-            check.hear(sequence, message, counters)
-        component.rates.hear(message, received_at)
+        component.sequence.hear(sequence, message, self.counters)
+        rates = component.rates
+        if received_at >= rates.until:
+            rates.turn(received_at)
+        rates.now[message] = rates.now.get(message, 0) + 1
         return True
 
     def count(self, received_at: int, number: int) -> None:

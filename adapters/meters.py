@@ -124,22 +124,26 @@ class SpeedMeter:
 class Rates:
     """How often each kind of message comes: counted in two buckets of 5 s."""
 
-    _until: int = 0
-    _now: dict[int, int] = field(default_factory=dict)
+    until: int = 0  # the stamp at which the bucket ends
+    now: dict[int, int] = field(default_factory=dict)
     _before: dict[int, int] = field(default_factory=dict)
 
     def hear(self, kind: int, at: int) -> None:
         """Count one message of a kind at a stamp."""
-        if at >= self._until:
-            self._before = self._now if at < self._until + _RATE_NS else {}
-            self._until, self._now = at + _RATE_NS, {}
-        self._now[kind] = self._now.get(kind, 0) + 1
+        if at >= self.until:
+            self.turn(at)
+        self.now[kind] = self.now.get(kind, 0) + 1
+
+    def turn(self, at: int) -> None:
+        """Begin the next bucket."""
+        self._before = self.now if at < self.until + _RATE_NS else {}
+        self.until, self.now = at + _RATE_NS, {}
 
     def per_second(self, at: int) -> dict[int, float]:
         """Messages a second by kind, over the last 5 to 10 s; kinds that were not heard then are left out."""
-        behind = at - (self._until - _RATE_NS)
+        behind = at - (self.until - _RATE_NS)
         if behind > 2 * _RATE_NS:
             return {}
         span_s = max(behind + _RATE_NS * bool(self._before), SECOND) / SECOND
-        kinds = sorted(self._now.keys() | self._before.keys())
-        return {kind: (self._now.get(kind, 0) + self._before.get(kind, 0)) / span_s for kind in kinds}
+        kinds = sorted(self.now.keys() | self._before.keys())
+        return {kind: (self.now.get(kind, 0) + self._before.get(kind, 0)) / span_s for kind in kinds}

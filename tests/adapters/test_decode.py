@@ -166,3 +166,59 @@ def test_a_submarine_without_utc_runs_on_the_envelope_and_its_cameras_definition
     assert Timing.UTC not in timings
     assert decoder.counters()["sub-five-components definition differs"] == 4
     assert {one.aircraft for each in heard for one in each.observations if isinstance(one, GpsReport)} == {"mavlink:1"}
+
+
+def test_what_says_nothing_is_none_to_hear_and_an_empty_one_to_feed() -> None:
+    recording = open_recording(EXCERPT)
+    quick, slow = Decoder(recording.sources), Decoder(recording.sources)
+    for arrival in recording.arrivals():
+        heard, fed = quick.hear(arrival), slow.feed(arrival)
+        assert (heard or Heard(fed.now)) == fed
+        assert heard is None or heard.observations or heard.notes
+    assert quick.counters() == slow.counters()
+
+
+class _Guard:
+    """Refuses every third frame."""
+
+    def __init__(self) -> None:
+        self.judged = 0
+
+    def judge(self, frame: bytes, source: int, now: int) -> str | None:
+        self.judged += 1
+        return "wrong signature" if self.judged % 3 == 0 else None
+
+
+def test_frames_that_a_guard_refuses_leave_no_trace_but_their_counter_and_one_sentence() -> None:
+    source = Source(0, "mavlink", "link", "udpin:0")
+    guarded, other = Decoder([source], signing=_Guard()), Decoder([source])
+    notes: list[str] = []
+    arrivals = list(open_recording(EXCERPT).arrivals())
+    for number, arrival in enumerate(arrivals):
+        one = guarded.hear(Arrival(arrival.received_at, 0, arrival.data))
+        notes += [] if one is None else [text for _, text in one.notes if "signature" in text]
+        assert (guarded.refused == "wrong signature") == (number % 3 == 2)
+        if guarded.refused is None:
+            expected = other.hear(Arrival(arrival.received_at, 0, arrival.data))
+            assert (one and one.observations) == (expected and expected.observations)
+    assert len(notes) == 1
+    counters = guarded.counters()
+    assert counters.pop("link wrong signature") == len(arrivals) // 3
+    assert counters == other.counters()
+
+
+def test_the_clock_is_named_before_the_sessions_time_leaps() -> None:
+    """The sentence comes in the time before, and nothing that was told before the leap is judged by the time after it."""
+    year = 365 * 86_400 * SECOND
+    decoder = Decoder([RADAR])
+    heard = [
+        decoder.feed(Arrival(T0 + number * SECOND, 3, _datagram(number, T0 + number * SECOND - year)))
+        for number in range(10)
+    ]
+    (named,) = [place for place, one in enumerate(heard) if any("runs on the clock" in text for _, text in one.notes)]
+    assert heard[named].now == T0 + named * SECOND
+    assert heard[named + 1].now == T0 + (named + 1) * SECOND - year
+    before = [one for each in heard[:named] for one in each.observations]
+    assert {one.timing for one in before if isinstance(one, RadarPlot)} == {Timing.FOREIGN}
+    after = [one for each in heard[named + 1 :] for one in each.observations]
+    assert {one.timing for one in after if isinstance(one, RadarPlot)} == {Timing.UTC}

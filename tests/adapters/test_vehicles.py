@@ -135,7 +135,7 @@ def test_without_utc_too_a_link_that_is_seconds_late_is_the_same_aircraft_once_i
 
 
 def test_without_utc_the_better_links_clock_serves_both() -> None:
-    """By the envelope alone a link that is 700 ms late would put its reports 700 ms too late."""
+    """By the envelope alone a link that is 250 ms late would put its reports that much too late."""
     plane = Airframe(utc_ahead_ns=None)
     heard, _, _ = hear([Link(plane), Link(plane, delay_ms=250, phase_ms=100)], 20)
     for one in reports(heard)[-40:]:
