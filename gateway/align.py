@@ -28,6 +28,9 @@ Bools = NDArray[np.bool_]
 SECOND = 1_000_000_000
 LEAST_POSITION_SIGMA_M = 0.3  # a receiver that claims less is describing its noise, not its error
 LEAST_VELOCITY_SIGMA_MPS = 0.1
+# Traffic that others pass on (its times are coarse) says its velocity as ADS-B does, whose lowest category is 10 m/s; MAVLink
+# does not pass the category on. SITL's traffic moves up to 24 m/s otherwise than it says.
+TRAFFIC_VELOCITY_SIGMA_MPS = 10.0
 UNKNOWN_SPEED_MPS = 100.0  # what a coarse time is worth in metres when the stream does not say how fast it flies
 # How far a height guessed from a pressure altitude may be off: 1013 for the day's pressure (30 hPa are 250 m), and warm
 # or cold air. Without one the guess is the runway's height, and an airliner may be as high as airliners are.
@@ -174,7 +177,8 @@ def place_reports(
         if row in guesses:
             upright = guesses[row][1]
         sigma = np.maximum(np.array([level, level, upright]), LEAST_POSITION_SIGMA_M)
-        speed = max(report.velocity_sigma_mps or site.position.velocity_sigma_mps, LEAST_VELOCITY_SIGMA_MPS)
+        usual = TRAFFIC_VELOCITY_SIGMA_MPS if report.timing_sigma_s else site.position.velocity_sigma_mps
+        speed = max(report.velocity_sigma_mps or usual, LEAST_VELOCITY_SIGMA_MPS)
         comparable = report.timing in (Timing.UTC, Timing.ENVELOPE)
         fixes.append(
             Fix(

@@ -59,6 +59,7 @@ class Tally:
 
     def __init__(self, runway: Runway) -> None:
         self.observations: Counter[str] = Counter()
+        self.traffic = 0  # GPS reports of aircraft that others told of
         self.tracks: set[int] = set()
         self.aircraft: set[str] = set()
         self.changes: Counter[str] = Counter()
@@ -70,6 +71,7 @@ class Tally:
     def add(self, picture: Picture) -> None:
         """Count one picture."""
         self.observations.update(type(observation).__name__ for observation in picture.observations)
+        self.traffic += sum(name.startswith("icao:") for name in picture.align.report_aircraft)
         self.tracks.update(picture.fuse.track.tolist())
         self.aircraft.update(name for name in picture.fuse.aircraft if name is not None)
         self.changes.update(change.kind for change in picture.associate.changes)
@@ -84,4 +86,5 @@ class Tally:
 
     def named_observations(self) -> dict[str, int]:
         """Counts by what people call them."""
-        return {KINDS.get(kind, kind): number for kind, number in sorted(self.observations.items()) if number}
+        named = {KINDS.get(kind, kind): number for kind, number in sorted(self.observations.items()) if number}
+        return {**named, "GPS reports of traffic": self.traffic} if self.traffic else named

@@ -164,6 +164,17 @@ def test_coarse_times_make_a_fast_aircraft_less_sure(world: Any, airliner: Any) 
         assert math.sqrt(row["covariance"].reshape(6, 6)[0, 0]) == pytest.approx(math.hypot(15.0, expected), rel=1e-3)
 
 
+def test_traffic_that_says_another_velocity_than_it_flies_is_followed(world: Any, airliner: Any) -> None:
+    """SITL's does, by 20 m/s; with the 1 m/s of a receiver's own velocity the track would fall far behind."""
+    slow = replace(airliner, speed_mps=60.0)
+    wrong = {"velocity_east_mps": 60.0, "velocity_north_mps": 20.0, "velocity_up_mps": 0.0}
+    said = [told(world, slow, 1.8 * t, timing_sigma_s=0.577, **wrong) for t in range(60)]
+    sure = [replace(one, velocity_sigma_mps=1.0) for one in said]
+    behind_m = [apart_m(world.run(reports).rows(updated_by="gps")[-1], said[-1]) for reports in (said, sure)]
+    assert behind_m[0] < 60.0
+    assert behind_m[1] > 3.0 * behind_m[0]
+
+
 @pytest.mark.parametrize("ticks", ["one", "20 ms"])
 def test_ticks_change_no_bit(world: Any, ticks: str) -> None:
     course = world.Course()
