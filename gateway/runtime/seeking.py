@@ -19,6 +19,7 @@ from gateway.settings.options import Mute, MutedSource
 SECOND = 10**9
 _DAY_NS = 86_400 * SECOND
 _STEP_NS = 4_000
+_LONGEST_S = 1e9
 _ELAPSED = r"\d+(?:\.\d+)?"
 _OF_DAY = r"\d\d:\d\d(?::\d\d(?:\.\d+)?)?Z"
 _DATED = r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:\.\d+)?)?(?:Z|[+-]\d\d:\d\d)?"
@@ -80,7 +81,7 @@ class Span:
         seconds = 0.0
         for part in parts:
             seconds = seconds * 60 + float(part)
-        return self.first + min(round(seconds * SECOND), 1 << 60) // _STEP_NS * _STEP_NS
+        return self.first + round(min(seconds, _LONGEST_S) * SECOND) // _STEP_NS * _STEP_NS
 
     def _of_date(self, text: str, option: str) -> int:
         try:
