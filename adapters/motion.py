@@ -101,6 +101,9 @@ def _attitude(
         counters["attitude told twice"] += 1
         return ()
     vehicle.last_attitude = boot_ns
+    for name, angle in zip(("roll, degrees", "pitch, degrees"), angles, strict=False):
+        vehicle.readings[name] = math.degrees(angle)
+    vehicle.readings["heading, degrees"] = math.degrees(angles[2]) % 360.0
     valid_at, _ = moments.when(component, boot_ns, received_at)
     return (Attitude(vehicle.name, valid_at, received_at, *angles),)
 

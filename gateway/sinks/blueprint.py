@@ -69,7 +69,7 @@ def _picture_page(site: Site, modes: bool) -> rrb.Horizontal:
 
 def _health_page() -> rrb.Horizontal:
     """What is heard of whom, and what vehicles last said of themselves: tables to read beside curves."""
-    speeds, lengths = f"/health/reading/{unit_part('m/s')}/**", f"/health/reading/{unit_part('m')}/**"
+    speeds, lengths, rates = (f"/health/reading/{unit_part(unit)}/**" for unit in ("m/s", "m", "1/s"))
     inner = [f"- /health/{part}/**" for part in ("lost", "time", "reading", "table")]
     return rrb.Horizontal(
         rrb.Vertical(
@@ -81,7 +81,8 @@ def _health_page() -> rrb.Horizontal:
             rrb.Tabs(
                 _plot("Readings, m/s", [speeds]),
                 _plot("Readings, m", [lengths]),
-                _plot("Other readings", ["/health/reading/**", f"- {speeds}", f"- {lengths}"]),
+                _plot("Messages, 1/s", [rates]),
+                _plot("Other readings", ["/health/reading/**", f"- {speeds}", f"- {lengths}", f"- {rates}"]),
             ),
             _plot("Clocks and delays, ms", ["/health/time/**"]),
             rrb.Tabs(_plot("Heard", ["/health/**", *inner]), _plot("Lost", ["/health/lost/**"])),

@@ -178,7 +178,7 @@ class _Maker:
         speed = float(np.linalg.norm(path(np.array([time_s]))[1]))
         settled = time_s >= 5.0
         times = (0.002, 0.01, 0.3) if settled else (math.nan,) * 3
-        readings = (("airspeed, m/s", speed), ("altitude, m", 600.0), ("temperature, K", 288.0))
+        readings = (("airspeed, m/s", speed), ("altitude, m", 600.0), ("temperature, K", 288.0), ("ATTITUDE, 1/s", 4.0))
         return VehicleHealth(AIRCRAFT, "UTC" if settled else "not settled", *times, readings, (("landed", "in air"),))
 
     def picture(self, step: int, first_s: float, last_s: float, end: bool) -> Picture:
