@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -105,7 +105,7 @@ def read_columns(
 
     Never raises for what is in the file; raises OSError where it cannot be read, KeyError for a wanted name that no message has.
     """
-    return _joined(list(iter_columns(path_or_file, wanted, counters)))
+    return _joined([part for _, part in _parts(path_or_file, wanted, counters)])
 
 
 def iter_columns(
@@ -116,21 +116,32 @@ def iter_columns(
     block_bytes: int = BLOCK_BYTES,
 ) -> Iterator[Columns]:
     """The same in blocks of about so many bytes of the file, so that a file of any length takes the memory of one block."""
+    parts: list[Columns] = []
+    size = 0
+    for read, part in _parts(path_or_file, wanted, counters):
+        parts.append(part)
+        size += read
+        if size >= block_bytes:
+            yield _joined(parts)
+            size = 0
+    if parts:
+        yield _joined(parts)
+
+
+def _parts(
+    path_or_file: str | Path | BinaryIO, wanted: Collection[str | int] | None, counters: Counter[str] | None
+) -> Iterator[tuple[int, Columns]]:
+    """The columns of each block that is read, and the block's size in bytes."""
     kinds = _Kinds(wanted)
     counted = Counter[str]() if counters is None else counters
-    opened = path_or_file if isinstance(path_or_file, str | Path) else None
-    with Path(opened).open("rb") if opened is not None else nullcontext(path_or_file) as file:
-        assert not isinstance(file, str | Path)
-        parts: list[Columns] = []
-        size = 0
+    with _opened(path_or_file) as file:
         for records, told, outgoing in stamped(read_records(file, counted), counted):
-            parts.append(_columns(records, told, outgoing, kinds))
-            size += len(records.data)
-            if size >= block_bytes:
-                yield _joined(parts)
-                parts, size = [], 0
-        if parts:
-            yield _joined(parts)
+            yield len(records.data), _columns(records, told, outgoing, kinds)
+
+
+def _opened(path_or_file: str | Path | BinaryIO) -> AbstractContextManager[BinaryIO]:
+    """A file that was given stays open."""
+    return Path(path_or_file).open("rb") if isinstance(path_or_file, str | Path) else nullcontext(path_or_file)
 
 
 class _Kinds:
@@ -184,9 +195,15 @@ def _unpacked(
 
 
 def _joined(parts: list[Columns]) -> Columns:
-    names = sorted({name for part in parts for name in part.messages})
-    messages = {name: _end_to_end([part.messages[name] for part in parts if name in part.messages]) for name in names}
-    return Columns(messages, _end_to_end([part.frames for part in parts]) if parts else np.empty(0, FRAME))
+    """The parts end to end. They are let go one message after the other, so that their memory is used again."""
+    if not parts:
+        return Columns({}, np.empty(0, FRAME))
+    tables, by_name = [part.frames for part in parts], [dict(part.messages) for part in parts]
+    parts.clear()
+    frames = _end_to_end(tables)
+    tables.clear()
+    names = sorted({name for messages in by_name for name in messages})
+    return Columns({name: _end_to_end([one.pop(name) for one in by_name if name in one]) for name in names}, frames)
 
 
 def _end_to_end(arrays: list[Structured]) -> Structured:

@@ -95,20 +95,21 @@ def headers(block: Bytes, size: int, start: Places) -> Headers:
     """The frames that begin at each place (a magic byte stands there) of a padded block of `size` bytes, checked."""
     head = rows(block, start, 10)
     is_v2 = head[:, 0] == V2
-    length, flags = head[:, 1], np.where(is_v2, head[:, 2], 0)
+    v1 = np.flatnonzero(~is_v2)
+    if len(v1):  # laid out as v2: no flags, and two more bytes of the id
+        head[v1, 4:8], head[v1, 2], head[v1, 8:] = head[v1, 2:6], 0, 0
+    length, flags = head[:, 1].astype(np.int64), head[:, 2]
     signed = flags & _SIGNED == 1
-    end = start + length + np.where(is_v2, 12, 8) + np.where(signed, 13, 0)
-    low = np.where(is_v2, head[:, 7], head[:, 5]).astype(np.uint32)
-    high = head[:, 8].astype(np.uint32) << 8 | head[:, 9].astype(np.uint32) << 16
-    message = low | np.where(is_v2, high, 0).astype(np.uint32)
+    end = start + length + np.where(is_v2, 12, 8)
+    end[signed] += 13
+    message: NDArray[np.uint32] = np.ascontiguousarray(head[:, 6:10]).view("<u4")[:, 0] >> np.uint32(8)
     fits = end <= size
     verdict = np.full(len(start), NOT_A_FRAME, np.uint8)
     checked = np.flatnonzero(fits & (flags <= _SIGNED))
     bodies = length[checked] + np.where(is_v2[checked], 9, 5)
-    verdict[checked] = _verdicts(block, start[checked] + 1, bodies.astype(np.int64), message[checked])
-    sequence, system, component = (np.where(is_v2, head[:, 4 + place], head[:, 2 + place]) for place in range(3))
-    version = np.where(is_v2, 2, 1).astype(np.uint8)
-    return Headers(start, end, fits, version, length, signed, sequence, system, component, message, verdict)
+    verdict[checked] = _verdicts(block, start[checked] + 1, bodies, message[checked])
+    version = np.where(is_v2, np.uint8(2), np.uint8(1))
+    return Headers(start, end, fits, version, head[:, 1], signed, head[:, 4], head[:, 5], head[:, 6], message, verdict)
 
 
 def windows(block: Bytes, width: int) -> NDArray[np.void]:

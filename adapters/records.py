@@ -53,7 +53,7 @@ def read_records(file: BinaryIO, counters: Counter[str], block: int = _BLOCK) ->
             continue
         limit = len(data) if last else max(len(data) - _AHEAD, 0)
         found = _Walk(data, limit, last=last, in_step=in_step, is_first=offset == 0)
-        if len(found.chosen):
+        if found.chosen is not None:
             if found.skipped + skipped:
                 counters["bytes skipped"] += found.skipped + skipped
             skipped = 0
@@ -101,12 +101,12 @@ class _Walk:
         accepted[doubtful] = is_followed | uncheckable
         return accepted
 
-    def _walk(self, limit: int, eligible: int) -> NDArray[np.int64]:
+    def _walk(self, limit: int, eligible: int) -> NDArray[np.int64] | slice | None:
         places, ends, accepted = self._places, self.frames.end, self._in_step
         follows = (places[1:eligible] == ends[: max(eligible - 1, 0)]) & accepted[1:eligible]
         breaks = [*np.flatnonzero(~follows).tolist(), eligible - 1]
         strong_places = places[self._strong]
-        runs: list[NDArray[np.int64]] = []
+        runs: list[slice] = []
         while self.at < limit:
             index = int(np.searchsorted(places[:eligible], self.at))
             if not (self.in_step and index < eligible and places[index] == self.at and accepted[index]):
@@ -120,9 +120,11 @@ class _Walk:
                 self.skipped += goal - self.at
                 index = int(self._strong[known])
             stop = breaks[bisect_left(breaks, index)]
-            runs.append(np.arange(index, stop + 1))
+            runs.append(slice(index, stop + 1))
             self.at = int(ends[stop])
-        return np.concatenate(runs) if runs else np.empty(0, np.int64)
+        if not runs:
+            return None
+        return runs[0] if len(runs) == 1 else np.concatenate([np.arange(run.start, run.stop) for run in runs])
 
 
 def _candidates(block: Bytes, size: int, is_behind_record: bool) -> tuple[Places, Headers]:
