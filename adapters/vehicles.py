@@ -20,7 +20,7 @@ from struct import Struct
 from adapters.clock import SourceClock
 from adapters.fixes import Fixes
 from adapters.likeness import ATTITUDE, GLOBAL_POSITION_INT, Likeness, Trace
-from adapters.mavlink_frames import Frame, SequenceCheck
+from adapters.mavlink_frames import Frame
 from adapters.meters import Rates
 from adapters.plans import PlanBook
 from adapters.roles import ARDUPILOT as ARDUPILOT
@@ -28,6 +28,7 @@ from adapters.roles import INVALID_AUTOPILOT as INVALID_AUTOPILOT
 from adapters.roles import PX4 as PX4
 from adapters.roles import STATIONS as STATIONS
 from adapters.roles import by_heartbeat, by_number, is_vehicle
+from adapters.sequences import SequenceCheck, Siblings
 from gateway.observation import VehicleStatus
 
 SYSTEM_TIME = 2
@@ -79,7 +80,7 @@ class Component:
     is_vehicle: bool
     role: str
     clock: SourceClock
-    sequence: SequenceCheck = field(default_factory=SequenceCheck)
+    sequence: SequenceCheck
     rates: Rates = field(default_factory=Rates)
     reboots_told: int = 0
     has_date_note: bool = False
@@ -110,6 +111,7 @@ class Registry:
     origins: dict[int, str]
     notes: list[tuple[str, str]]
     components: dict[tuple[int, int, int], Component] = field(default_factory=dict)
+    _siblings: dict[tuple[int, int], Siblings] = field(default_factory=dict)
     _members: dict[int, dict[int, _Member]] = field(default_factory=dict)  # by system, then by source
     _vehicles: dict[int, list[Vehicle]] = field(default_factory=dict)
 
@@ -119,7 +121,8 @@ class Registry:
         known = self.components.get(key)
         if known is None:
             clock = SourceClock(key)
-            known = self.components[key] = Component(key, component == 1, by_number(component), clock)
+            sequence = SequenceCheck(self._siblings.setdefault(key[:2], Siblings()))
+            known = self.components[key] = Component(key, component == 1, by_number(component), clock, sequence)
         return known
 
     def vehicles(self) -> list[Vehicle]:

@@ -13,8 +13,9 @@ from dataclasses import dataclass, field
 
 from adapters import Arrival, Source
 from adapters.decode import Decoder
-from adapters.mavlink_frames import Frame, SequenceCheck, fields, message_name, parse
+from adapters.mavlink_frames import Frame, fields, message_name, parse
 from adapters.roles import by_heartbeat, by_number
+from adapters.sequences import SequenceCheck, Siblings
 from gateway.observation import FlightPlan, GpsReport, Observation, RadarPlot, RadarStatus, Timing
 from gateway.picture import Health, VehicleHealth
 from gateway.runtime.places import PlaceFinder
@@ -67,7 +68,7 @@ class Component:
     versions: Counter[int] = field(default_factory=Counter)
     signed: int = 0
     counters: Counter[str] = field(default_factory=Counter)
-    _sequence: SequenceCheck = field(default_factory=SequenceCheck)
+    sequence: SequenceCheck = field(default_factory=SequenceCheck)
 
     @property
     def name(self) -> str:
@@ -79,7 +80,7 @@ class Component:
         self.frames.hear(received_at)
         self.versions[frame.version] += 1
         self.signed += frame.signed
-        self._sequence.hear(frame.sequence, frame.message, self.counters)
+        self.sequence.hear(frame.sequence, frame.message, self.counters)
         if frame.verdict != "good":
             self.counters[f"{frame.verdict}: message {message_name(frame.message)}"] += 1
         if frame.message == HEARTBEAT and frame.verdict == "good":
@@ -187,7 +188,10 @@ def _count(found: Survey, source: Source, arrival: Arrival) -> None:
     key = (source.number, frame.system, frame.component)
     component = found.components.get(key)
     if component is None:
-        component = found.components[key] = Component(source, *key[1:], by_number(frame.component))
+        beside = [one for place, one in found.components.items() if place[:2] == key[:2]]
+        siblings = beside[0].sequence.siblings if beside else Siblings()
+        name, check = by_number(frame.component), SequenceCheck(siblings)
+        component = found.components[key] = Component(source, frame.system, frame.component, name, sequence=check)
     component.hear(frame, at)
 
 

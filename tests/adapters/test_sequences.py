@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adapters.columns import read_columns
-from adapters.sequences import SequenceCheck
+from adapters.sequences import SequenceCheck, Siblings
 
 RECORDINGS = Path(__file__).parents[3] / "shared" / "data"
 
@@ -92,3 +92,53 @@ def test_the_real_copter_lost_224_frames_and_its_radio_4() -> None:
     assert ((steps[1] - 1) % 256).sum() == 450
     assert (steps[1] == 227).sum() == 1
     assert counted == {1: {"lost": 224, "restarted": 1}, 51: {"lost": 4}}
+
+
+def _two(numbers: list[tuple[int, int]]) -> tuple[Counter[str], Counter[str]]:
+    """What is counted of two components of one system; each item is which of them, and its number."""
+    siblings, counters = Siblings(), (Counter[str](), Counter[str]())
+    checks = (SequenceCheck(siblings), SequenceCheck(siblings))
+    for which, number in numbers:
+        checks[which].hear(number & 255, 7, counters[which])
+    return counters
+
+
+def test_components_that_share_a_counter_lose_nothing_by_it() -> None:
+    """A companion computer that sends for two components counts with one counter; what is lost of both still shows."""
+    senders = [0 if number % 5 else 1 for number in range(2000)]
+    whole = list(zip(senders, range(2000), strict=True))
+    assert [counters["lost"] for counters in _two(whole)] == [0, 0]
+    holes = [one for place, one in enumerate(whole) if place not in (1000, 1001, 1503)]
+    assert sum(counters["lost"] for counters in _two(holes)) == 3
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(0, 255), st.integers(0, 255), st.lists(st.booleans(), min_size=50, max_size=800))
+def test_components_with_counters_of_their_own_are_never_taken_together(
+    first: int, second: int, turns: list[bool]
+) -> None:
+    """Every tenth frame of either is lost, and all of that is counted, however the two take turns."""
+    numbers, heard, expected, pending = [first, second], [], [0, 0], [0, 0]
+    for place, turn in enumerate(turns):
+        which = int(turn)
+        numbers[which] += 1
+        if place % 10 == 9:
+            pending[which] += 1
+        else:
+            if any(one == which for one, _ in heard):
+                expected[which] += pending[which]
+            pending[which] = 0
+            heard.append((which, numbers[which]))
+    assert [counters["lost"] for counters in _two(heard)] == expected
+
+
+def test_the_submarine_s_companion_lost_nothing() -> None:
+    """Its GPS input and its heartbeat come from one program: 1272 gaps in each other's numbers, and none in both together."""
+    path = RECORDINGS / "sub-five-components.tlog"
+    if not path.exists():
+        pytest.skip("the recordings beside the project are not here")
+    frames = read_columns(path, []).frames
+    frames = frames[(frames["system"] == 1) & np.isin(frames["component"], (194, 220))]
+    heard = list(zip((frames["component"] == 220).astype(int).tolist(), frames["sequence"].tolist(), strict=True))
+    assert len(heard) == 1275
+    assert [counters["lost"] for counters in _two(heard)] == [0, 0]
