@@ -22,7 +22,8 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from adapters import Arrival, Source, told
-from adapters.clock import LIMIT_NS, SessionEpoch
+from adapters.clock import LIMIT_NS
+from adapters.epoch import SessionEpoch
 from adapters.listening import Listened
 from adapters.mavlink import MavlinkObserver
 from adapters.mavlink_frames import parse

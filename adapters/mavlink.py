@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from adapters import air, condition, drone_id, high_latency, missions, motion, positions, simulated, traffic, utm
-from adapters.clock import SessionEpoch
+from adapters.epoch import SessionEpoch
 from adapters.mavlink_frames import Frame
 from adapters.moments import Moments, Observations, Reader
 from adapters.plans import MISSION_MESSAGES, overheard

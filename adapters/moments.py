@@ -11,7 +11,8 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from adapters.clock import LIMIT_NS, SessionEpoch
+from adapters.clock import LIMIT_NS
+from adapters.epoch import SessionEpoch
 from adapters.meters import SECOND, SpeedMeter
 from adapters.vehicles import Component, Vehicle
 from gateway.observation import Observation, Timing

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from adapters.clock import SessionEpoch
+from adapters.epoch import SessionEpoch
 from adapters.mavlink_frames import message_name
 from adapters.vehicles import Component, Registry, Vehicle
 from gateway.observation import Timing

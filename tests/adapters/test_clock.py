@@ -1,6 +1,7 @@
 """A source's clock, and the session's."""
 
-from adapters.clock import SessionEpoch, SourceClock
+from adapters.clock import SourceClock
+from adapters.epoch import SessionEpoch
 from adapters.meters import Envelope
 from gateway.observation import Timing
 

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters.clock import SessionEpoch, SourceClock
+from adapters.clock import SourceClock
+from adapters.epoch import SessionEpoch
 from adapters.meters import Delays, Rates, SpeedMeter
 from gateway.observation import Timing
 
