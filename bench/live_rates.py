@@ -36,7 +36,9 @@ def live_rates(seconds: float) -> list[Figure]:
     fleet = _run(FLEET_VEHICLES, FLEET, int(seconds), "default")
     return [
         *_figures(f"live, {FAST}/s, {fast['buffer_kib']} KiB", fast, lost=0.0, share=50.0),
-        *_figures(f"live, {FLEET}/s, {FLEET_VEHICLES} vehicles, {fleet['buffer_kib']} KiB", fleet, lost=0.1, share=None),
+        *_figures(
+            f"live, {FLEET}/s, {FLEET_VEHICLES} vehicles, {fleet['buffer_kib']} KiB", fleet, lost=0.1, share=None
+        ),
     ]
 
 

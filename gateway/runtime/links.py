@@ -19,6 +19,8 @@ from gateway.runtime.batches import SO_RXQ_OVFL, SO_TIMESTAMPNS, batches_of
 from gateway.runtime.urls import LinkError, Url, bracketed
 
 RECEIVE_BUFFER_BYTES = 4 << 20
+_LARGE_BUFFER = 1 << 20  # some 2 700 small datagrams; the system's own choice holds a tenth of it
+_LONG_S, _SHORT_S = 0.01, 0.003
 _LARGEST_DATAGRAM = 65_535
 _DATAGRAMS_A_TURN = 2048  # then the other links have theirs
 _LINUX = sys.platform == "linux"
@@ -50,6 +52,7 @@ class Link(Protocol):
     url: Url
     counters: Counter[str]
     news: list[tuple[str, str]]  # (level, text) to be told once
+    patience_s: float  # how long what comes in can wait for us, at any rate that we can keep up with
 
     def fileno(self) -> int | None:
         """What to wait on, or None: closed at the moment, or to be asked at every turn."""
@@ -117,6 +120,7 @@ class UdpLink:
         self._batches = batches_of(self._socket)
         try:
             self.granted_bytes = self._configure(receive_buffer_bytes)
+            self.patience_s = _LONG_S if self.granted_bytes >= _LARGE_BUFFER else _SHORT_S
             if url.scheme == "udpin":
                 self._socket.bind(self._address)
                 host, port = self._socket.getsockname()[:2]

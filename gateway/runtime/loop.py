@@ -1,4 +1,4 @@
-"""The loops that drive a session: live, in ticks of 10 ms; replayed, at full speed or at the pace of old."""
+"""The loops that drive a session: live, in ticks of 10 to 20 ms; replayed, at full speed or at the pace of old."""
 
 from __future__ import annotations
 
@@ -19,6 +19,10 @@ from gateway.runtime.setup import RunFailure, Setup
 from gateway.runtime.summary import Summary
 
 TICK_S = 0.01  # so that a late report is in the picture within 30 ms also when a tick draws, which takes 15
+_BUSY_TICK_S = (
+    0.02  # where thousands come a second, half as many steps of twice the size: a step has a price of its own
+)
+_BUSY = 100  # arrivals a tick
 _IDLE_NS = 100_000_000  # when nothing came, the watermark alone is worked in this often: an empty step costs 1 ms
 _REPLAY_STEP_NS = 1_000_000_000  # of stamps, at full speed: large steps are cheap steps
 _PACED_STEP_NS = 40_000_000
@@ -65,9 +69,9 @@ def run_live(
         with _Abandoning(run), UnhurriedCollection() as collection:
             receiver.start()
 
-            def tick() -> None:
-                _tick(receiver, run, watch, manners)
+            def tick() -> int:
                 collection.collect_when_due()
+                return _tick(receiver, run, watch, manners)
 
             ended = _live(tick, run, seconds, asked_to_stop, no_place_after_s)
             receiver.close()
@@ -78,13 +82,13 @@ def run_live(
 
 
 def _live(
-    tick: Callable[[], None], run: Run, seconds: float | None, asked_to_stop: AskedToStop, no_place_after_s: float
+    tick: Callable[[], int], run: Run, seconds: float | None, asked_to_stop: AskedToStop, no_place_after_s: float
 ) -> str:
     """Tick until the end; how it ended."""
     began = time.monotonic()
     while True:
         tick_began = time.monotonic()
-        tick()
+        arrivals = tick()
         if run.place is None and run.heard_for_s > no_place_after_s:
             raise RunFailure(
                 "Nothing that came in tells where the runway is (no HOME_POSITION, no mission, nobody standing still); "
@@ -94,22 +98,24 @@ def _live(
             return f"stopped by {asker}"
         if seconds is not None and tick_began - began >= seconds:
             return "done"
-        time.sleep(max(0.0, TICK_S - (time.monotonic() - tick_began)))
+        tick_s = TICK_S if arrivals < _BUSY else _BUSY_TICK_S
+        time.sleep(max(0.0, tick_s - (time.monotonic() - tick_began)))
 
 
-def _tick(receiver: Receiver, run: Run, watch: Watch, manners: Manners | None, *, is_last: bool = False) -> None:
-    """Work in what came; where nothing did, the watermark, if it has not been worked in for a while."""
+def _tick(receiver: Receiver, run: Run, watch: Watch, manners: Manners | None, *, is_last: bool = False) -> int:
+    """Work in what came; where nothing did, the watermark, if it has not been worked in for a while. How much came."""
     delivery = receiver.drain()
     notes = delivery.notes
     if manners is not None and not is_last:
         notes = (*notes, *_speak(receiver, delivery, manners))
     is_idle = not (delivery.arrivals or delivery.sources or notes)
     if is_idle and not is_last and delivery.watermark - run.watermark < _IDLE_NS:
-        return
+        return 0
     for source in delivery.sources:
         run.add(source)
     run.count(receiver.counters() if manners is None else receiver.counters() | manners.counters)
     watch(run, run.work(delivery.arrivals, delivery.watermark, notes))
+    return len(delivery.arrivals)
 
 
 def _speak(receiver: Receiver, delivery: Delivery, manners: Manners) -> list[tuple[str, str]]:

@@ -22,7 +22,8 @@ from gateway.runtime.stamps import Stamper
 _SELECTOR = getattr(selectors, "PollSelector", selectors.SelectSelector)
 _WAIT_S = 0.02  # how long the thread waits for bytes before it looks at its links and moves the watermark
 _LAST_TURNS = 100  # what the kernel still holds at the end, but never a peer that sends without pause
-_REST_S = 0.004  # 40 datagrams at 10 000 a second: a seventh of what a default receive buffer holds
+_REST_S = 0.004  # between turns that brought something
+_MUCH = 100  # chunks a turn from which on it may rest longer: few large turns cost less than many small ones
 _OUTBOX_AT_MOST = 1000
 QUEUE_ARRIVALS = 200_000  # some 60 MB, and 20 s of the fastest stream measured
 
@@ -59,7 +60,7 @@ class Receiver:
         self._failure: BaseException | None = None
         self._overflow = 0
         self._overflow_told = False
-        self._has_heard = False
+        self._rest_s = 0.0
         self._outbox: deque[tuple[int, bytes]] = deque()
         self._unsent: Counter[str] = Counter()
         self._told: deque[bytes] = deque()
@@ -137,7 +138,7 @@ class Receiver:
         self._wait(wait_s)
         heard = [(number, chunks) for number, link in enumerate(self._links) if (chunks := link.receive()).data]
         count = sum(len(chunks.data) for _, chunks in heard)
-        self._has_heard = count > 0
+        self._rest_s = self._rest(count)
         sources, arrivals = self._intake.take(heard)
         if self._told:
             told_by, told = self._intake.tell([self._told.popleft() for _ in range(len(self._told))])
@@ -168,10 +169,15 @@ class Receiver:
                 number, peer = way
                 self._links[number].send(data, peer)
 
+    def _rest(self, heard: int) -> float:
+        """How long to rest after a turn that brought so many chunks, s."""
+        patience_s = min((link.patience_s for link in self._links), default=_REST_S)
+        return 0.0 if not heard else patience_s if heard >= _MUCH else min(_REST_S, patience_s)
+
     def _wait(self, wait_s: float) -> None:
-        if self._has_heard and wait_s:
+        if self._rest_s and wait_s:
             # Waiting for the next of many would wake us for each; so the kernel keeps them, and one turn takes them all.
-            time.sleep(_REST_S)
+            time.sleep(self._rest_s)
             return
         # A selector a turn follows links that close and come back without any book-keeping; poll needs no system call for it.
         with _SELECTOR() as selector:

@@ -51,6 +51,8 @@ class _StreamLink(ABC):
     The peer is the URL. Counters: "connections lost", "connections refused", "not sent".
     """
 
+    patience_s = 0.01  # the other side waits when we do
+
     def __init__(self, url: Url) -> None:
         self.url = url
         self.counters: Counter[str] = Counter()
