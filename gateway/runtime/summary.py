@@ -71,7 +71,7 @@ class Tally:
     def add(self, picture: Picture) -> None:
         """Count one picture."""
         self.observations.update(type(observation).__name__ for observation in picture.observations)
-        self.traffic += sum(name.startswith("icao:") for name in picture.align.report_aircraft)
+        self.traffic += sum(not name.startswith("mavlink:") for name in picture.align.report_aircraft)
         self.tracks.update(picture.fuse.track.tolist())
         self.aircraft.update(name for name in picture.fuse.aircraft if name is not None)
         self.changes.update(change.kind for change in picture.associate.changes)

@@ -8,10 +8,13 @@ Curves for what changes: /health/SOURCE, /health/lost/SOURCE, /health/time/VEHIC
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 import rerun as rr
 
+from gateway.observation import FlightPlan
 from gateway.picture import Picture, SourceHealth, VehicleHealth
 from gateway.sinks.scene.entry import Always, Entry, entity, once
 from gateway.sinks.scene.lately import BEFORE_ALL, Lately
@@ -31,18 +34,38 @@ class HealthScene:
         self._sampled = BEFORE_ALL
         self._named: Lately[str] = Lately()
         self._tables: dict[str, str] = {}
+        self._plans: dict[str, str] = {}  # what each aircraft's plan holds; also those that came from a file
+        self._planned: Lately[str] = Lately(self._plans.pop)
 
     def entries(self, pictures: Sequence[Picture]) -> list[Entry]:
         """What these pictures add."""
         entries: list[Entry] = []
         samples: list[Sample] = []
         for picture in pictures:
+            self._take_plans(picture)
             if not 0 <= picture.now - self._sampled < SAMPLE_NS:
                 self._sampled = picture.now
                 samples += _samples(picture)
-                entries += self._changed(picture, VEHICLES, vehicles_table(picture.health.vehicles))
+                entries += self._changed(picture, VEHICLES, vehicles_table(self._with_plans(picture)))
                 entries += self._changed(picture, SOURCES, sources_table(picture.health.sources))
         return plotted(samples, self._named) + entries
+
+    def _take_plans(self, picture: Picture) -> None:
+        for plan in picture.observations:
+            if isinstance(plan, FlightPlan):
+                kinds = Counter(point.kind for point in plan.points)
+                self._plans[plan.aircraft] = ", ".join(kind if n == 1 else f"{n} {kind}s" for kind, n in kinds.items())
+                self._planned.is_new(plan.aircraft, picture.now)
+
+    def _with_plans(self, picture: Picture) -> list[VehicleHealth]:
+        """The vehicles, each with what its flight plan holds among its words."""
+        found = []
+        for vehicle in picture.health.vehicles:
+            if plan := self._plans.get(vehicle.aircraft):
+                self._planned.is_new(vehicle.aircraft, picture.now)
+                vehicle = replace(vehicle, words=(*vehicle.words, ("flight plan", plan)))
+            found.append(vehicle)
+        return found
 
     def _changed(self, picture: Picture, path: str, text: str) -> list[Entry]:
         """A table, if it is not the one that is shown already."""
