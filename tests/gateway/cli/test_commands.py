@@ -14,7 +14,7 @@ from gateway.cli.options import Viewer
 from gateway.cli.replay import read_speed
 from gateway.cli.viewing import chosen
 
-COMMANDS = ("demo", "live", "replay", "simulate", "play", "site", "study", "sessions")
+COMMANDS = ("demo", "live", "replay", "simulate", "play", "check", "columns", "site", "study", "sessions")
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -53,6 +53,13 @@ def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
         (["study", "history"], "no study 'history'"),
         (["sessions", "/nowhere/at/all"], "no folder /nowhere/at/all"),
         (["site", "/nowhere/at/all.tlog"], "cannot be read"),
+        (["check", "/nowhere/at/all.tlog"], "cannot be read"),
+        (["columns", "/nowhere/at/all.tlog", "--out", "x"], "cannot be read"),
+        (["live", "--mavlink", "udpin:127.0.0.1:0", "--key", "/nowhere/at/all.key"], "all.key"),
+        (["live", "--mavlink", "udpin:127.0.0.1:0", "--allow-peer", "home"], "'home' is not a peer"),
+        (["live", "--mavlink", "udpin:127.0.0.1:0", "--allow-system", "0"], "'0'"),
+        (["live", "--mavlink", "udpin:127.0.0.1:0", "--plan", "/nowhere/at/all.plan"], "all.plan"),
+        (["live", "--mavlink", "udpin:127.0.0.1:0", "--publish", "qgc"], "'qgc' is not a link"),
     ],
 )
 def test_wrong_usage_is_one_plain_sentence_and_exit_code_2(
