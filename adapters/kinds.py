@@ -79,16 +79,16 @@ _BEGINNINGS = {  # what people take for a recording, or drop by mistake
     b"\x89PNG": "a picture",
     b"\xff\xd8\xff": "a picture",
     b"%PDF": "a PDF document",
-    b"PK\x03\x04": "a zip archive: unpack it first",
-    b"\x1f\x8b": "compressed by gzip: unpack it first",
-    b"BZh": "compressed by bzip2: unpack it first",
-    b"\xfd7zXZ": "compressed by xz: unpack it first",
-    b"\x28\xb5\x2f\xfd": "compressed by zstd: unpack it first",
+    b"PK\x03\x04": "a zip archive, to be unpacked first",
+    b"\x1f\x8b": "compressed by gzip, to be unpacked first",
+    b"BZh": "compressed by bzip2, to be unpacked first",
+    b"\xfd7zXZ": "compressed by xz, to be unpacked first",
+    b"\x28\xb5\x2f\xfd": "compressed by zstd, to be unpacked first",
     b"PAR1": "a Parquet table, not a recording",
     b"RRF": "a Rerun recording, which a viewer opens",
     b"MATLAB": "a MATLAB file, not a recording",
     b"SQLite format 3": "a database, not a recording",
-    b"FMT, 128": "a dataflash log as text: give the .BIN that it was made from",
+    b"FMT, 128": "a dataflash log as text, not the .BIN that it was made from",
 }
 
 

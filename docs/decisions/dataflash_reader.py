@@ -39,11 +39,13 @@ def damaged(log: bytes, what: str, seed: int) -> bytes:
 
 
 def ours(path: Path) -> int:
+    """How many wanted entries our reader finds."""
     with path.open("rb") as file:
         return sum(1 for _ in DataflashReader(file, WANTED))
 
 
 def theirs(path: Path, told: io.StringIO) -> int:
+    """How many DFReader finds; what it prints goes to `told`."""
     count = 0
     with contextlib.redirect_stderr(told), contextlib.redirect_stdout(told), DFReader_binary(str(path)) as log:
         while (message := log.recv_msg()) is not None:
@@ -52,6 +54,7 @@ def theirs(path: Path, told: io.StringIO) -> int:
 
 
 def main() -> None:
+    """Print a line for each kind of damage."""
     log = LOG.read_bytes()
     path = Path(tempfile.mkdtemp()) / "log.BIN"
     path.write_bytes(log)

@@ -71,8 +71,8 @@ def test_a_session_is_a_folder_with_session_json(tmp_path: Path) -> None:
         (b'{"mission": [1, 2, 3], "version": 1}', "JSON"),
         (bytes(range(256)) * 8, "not a recording"),
         (_mavlink() * 5, "MAVLink frames without times"),
-        (b"\x1f\x8b\x08" + bytes(100), "gzip: unpack it first"),
-        (b"FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n" * 9, "give the .BIN"),
+        (b"\x1f\x8b\x08" + bytes(100), "gzip, to be unpacked first"),
+        (b"FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n" * 9, "not the .BIN that it was made from"),
     ],
 )
 def test_what_is_no_recording_is_said_in_one_sentence(tmp_path: Path, content: bytes, expected: str) -> None:
