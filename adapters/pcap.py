@@ -8,8 +8,8 @@
 Link types: NULL (0), Ethernet (1), RAW (101), LOOP (108), Linux SLL (113), IPv4 (228), IPv6 (229), SLL2 (276).
 Datagrams that were cut by the capture or fragmented by IP are left out and counted.
 
-Ours is LINKTYPE_RAW with microseconds: each datagram behind an IPv4 and UDP header that we make up, with the peer's
-address in it where that is an IPv4 address, else 127.0.0.1, so that every tool opens it.
+Ours is LINKTYPE_RAW with microseconds: each datagram behind an IP and UDP header that we make up, of the version that
+the peer's address has, so that every tool opens it. A peer without an address (a serial port) is written as 127.0.0.1.
 """
 
 from __future__ import annotations
@@ -162,13 +162,26 @@ class PcapWriter:
     def write(self, received_at: int, data: bytes, peer: str = "") -> None:
         """Add one datagram. `received_at` in ns since 1970 UTC, kept to the microsecond; `peer` is "host:port"."""
         address, port = _address(peer)
-        length = len(data) + 28
-        udp = struct.pack(">HHHH", port, RADAR_PORT, len(data) + 8, 0)
-        ip = struct.pack(">BBHHHBBH4s4s", 0x45, 0, length, 0, 0x4000, 64, _UDP, 0, address, b"\x7f\0\0\1")
-        ip = ip[:10] + _checksum(ip).to_bytes(2, "big") + ip[12:]
+        packet = _ipv4_packet(address, port, data) if len(address) == 4 else _ipv6_packet(address, port, data)
         seconds, nanoseconds = divmod(received_at, 10**9)
-        record = struct.pack(">IIII", seconds, nanoseconds // 1000, length, length)
-        self._sink.write(record + ip + udp + data)
+        record = struct.pack(">IIII", seconds, nanoseconds // 1000, len(packet), len(packet))
+        self._sink.write(record + packet)
+
+
+def _ipv4_packet(sender: bytes, port: int, data: bytes) -> bytes:
+    udp = struct.pack(">HHHH", port, RADAR_PORT, len(data) + 8, 0)
+    ip = struct.pack(">BBHHHBBH4s4s", 0x45, 0, len(data) + 28, 0, 0x4000, 64, _UDP, 0, sender, b"\x7f\0\0\1")
+    return ip[:10] + _checksum(ip).to_bytes(2, "big") + ip[12:] + udp + data
+
+
+def _ipv6_packet(sender: bytes, port: int, data: bytes) -> bytes:
+    """Its UDP must have a checksum, which covers the addresses as well."""
+    receiver, length = ipaddress.IPv6Address("::1").packed, len(data) + 8
+    udp = struct.pack(">HHHH", port, RADAR_PORT, length, 0)
+    summed = sender + receiver + struct.pack(">II", length, _UDP) + udp + data
+    checksum = _checksum(summed + b"\0" * (len(summed) % 2)) or 0xFFFF
+    ip = struct.pack(">IHBB16s16s", 6 << 28, length, _UDP, 64, sender, receiver)
+    return ip + udp[:6] + checksum.to_bytes(2, "big") + data
 
 
 @lru_cache(maxsize=64)
@@ -176,15 +189,16 @@ def _address(peer: str) -> tuple[bytes, int]:
     host, _, port = peer.rpartition(":")
     number = int(port) if port.isdecimal() and int(port) < 65536 else 0
     try:
-        return ipaddress.IPv4Address(host).packed, number
+        return ipaddress.ip_address(host.strip("[]").partition("%")[0]).packed, number
     except ValueError:
         return b"\x7f\0\0\1", number
 
 
 def _checksum(header: bytes) -> int:
     total: int = sum(struct.unpack(f">{len(header) // 2}H", header))
-    total = (total & 0xFFFF) + (total >> 16)
-    return ~(total + (total >> 16)) & 0xFFFF
+    while total >> 16:
+        total = (total & 0xFFFF) + (total >> 16)
+    return ~total & 0xFFFF
 
 
 def _name(address: bytes, port: int) -> str:

@@ -17,7 +17,7 @@ _CONNECT_TIMEOUT_S = 5.0
 _UNDER_WAY = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK)
 # Ask after 10 s of silence, three times; what we send and nobody confirms ends it as well (where the system can do that).
 _KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3, "TCP_USER_TIMEOUT": 25_000, "TCP_NODELAY": 1}
-_READ_BYTES = 65_536
+_READ_BYTES = 32_768  # a piece fits into a datagram of a .pcap
 _READS_A_TURN = 16
 _RETRY_NS = (500_000_000, 1_000_000_000, 2_000_000_000, 5_000_000_000)  # then every 5 s
 

@@ -68,6 +68,26 @@ def test_our_headers_have_a_right_checksum() -> None:
     assert (total & 0xFFFF) + (total >> 16) == 0xFFFF
 
 
+@pytest.mark.parametrize("payload", [b"", b"odd", b"even"])
+def test_an_ipv6_peer_is_written_as_one_with_the_checksum_that_its_udp_must_have(payload: bytes) -> None:
+    sink = Records()
+    PcapWriter(sink).write(T0, payload, "[2001:db8::7%3]:4567")
+    ((one,), reader) = _read(b"".join(sink))
+    assert (one.sender, one.data, +reader.counters) == ("[2001:db8::7]:4567", payload, {})
+    packet = sink[1][16:]
+    summed = packet[8:40] + struct.pack(">II", len(packet) - 40, 17) + packet[40:] + b"\0" * (len(payload) % 2)
+    total = sum(struct.unpack(f">{len(summed) // 2}H", summed))
+    assert total % 0xFFFF == 0  # in ones' complement 0xFFFF is 0
+
+
+@pytest.mark.parametrize("peer", ["udpin:0.0.0.0:14550", "serial:/dev/ttyUSB0:57600", ""])
+def test_a_peer_without_an_address_is_written_as_this_machine(peer: str) -> None:
+    sink = Records()
+    PcapWriter(sink).write(T0, b"payload", peer)
+    ((one,), _) = _read(b"".join(sink))
+    assert one.sender.startswith("127.0.0.1:")
+
+
 @pytest.mark.parametrize("order", ["<", ">"])
 @pytest.mark.parametrize("nano", [False, True])
 def test_both_byte_orders_and_both_resolutions_are_read(order: str, nano: bool) -> None:

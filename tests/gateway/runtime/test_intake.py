@@ -1,6 +1,7 @@
 """From chunks of links to stamped arrivals."""
 
 from adapters.mavlink_frames import encode
+from gateway.runtime.allowed import Allowed, parse_allowed
 from gateway.runtime.intake import PEERS_AT_MOST, Intake
 from gateway.runtime.links import Chunks
 from gateway.runtime.stamps import Stamper
@@ -13,10 +14,10 @@ def frame(sequence: int) -> bytes:
     return encode("HEARTBEAT", HEARTBEAT, system=1, sequence=sequence)
 
 
-def intake(mavlink: int = 1, radar: int = 1) -> Intake:
+def intake(mavlink: int = 1, radar: int = 1, allowed: Allowed | None = None) -> Intake:
     """An intake whose clocks stand still at NOW."""
     stamper = Stamper(lambda: NOW, lambda: 0)
-    return Intake(stamper, [f"link {n}" for n in range(mavlink)], [f"radar link {n}" for n in range(radar)])
+    return Intake(stamper, [f"link {n}" for n in range(mavlink)], [f"radar link {n}" for n in range(radar)], allowed)
 
 
 def said(peer: str, *data: bytes, stream: int | None = None, kernel: tuple[int | None, ...] = ()) -> Chunks:
@@ -67,3 +68,41 @@ def test_more_peers_than_anyone_has_are_counted_and_not_heard() -> None:
     sources, _ = takes.take([(0, said(f"peer {n}", frame(0))) for n in range(PEERS_AT_MOST + 3)])
     assert sum(source.kind == "mavlink" for source in sources) == PEERS_AT_MOST
     assert takes.counters["link 0"]["datagrams of too many peers"] == 3
+
+
+def test_peers_that_are_not_allowed_never_become_sources_and_are_counted_by_link() -> None:
+    takes = intake(allowed=parse_allowed(["10.0.0.0/24"]))
+    sources, arrivals = takes.take(
+        [
+            (0, said("10.0.1.9:5", frame(0), frame(1))),
+            (0, said("10.0.0.9:5", frame(2))),
+            (1, said("10.0.1.9:6", b"plot")),
+            (1, said("10.0.0.9:6", b"plot")),
+        ]
+    )
+    assert [source.origin for source in sources] == ["radar link 0", "link 0 from 10.0.0.9:5"]
+    assert [arrival.data for arrival in arrivals] == [frame(2), b"plot"]
+    assert takes.counters["link 0"]["peer not allowed"] == 2
+    assert takes.counters["radar link 0"]["peer not allowed"] == 1
+
+
+def test_a_byte_stream_needs_no_leave_because_its_url_named_it() -> None:
+    takes = intake(allowed=parse_allowed(["10.0.0.0/24"]))
+    _, arrivals = takes.take([(0, said("serial:/dev/ttyUSB0:57600", frame(0) + frame(1), stream=0))])
+    assert [arrival.data for arrival in arrivals] == [frame(0), frame(1)]
+
+
+def test_systems_that_are_not_allowed_are_left_out_frame_by_frame_and_make_no_source() -> None:
+    takes = intake(allowed=parse_allowed(systems=["1"]))
+    other = encode("HEARTBEAT", HEARTBEAT, system=2)
+    sources, arrivals = takes.take([(0, said("a", other + frame(0) + other)), (0, said("b", other))])
+    assert [source.origin for source in sources if source.kind == "mavlink"] == ["link 0 from a"]
+    assert [arrival.data for arrival in arrivals] == [frame(0)]
+    assert takes.counters["link 0"]["system not allowed"] == 3
+
+
+def test_the_way_back_to_a_source_is_its_link_and_its_peer() -> None:
+    takes = intake(2, 1)
+    sources, _ = takes.take([(0, said("a", frame(0))), (1, said("a", frame(1)))])
+    ways = {source.name: takes.way_to(source.number) for source in sources}
+    assert ways == {"radar-1": None, "mavlink-1": (0, "a"), "mavlink-2": (1, "a")}

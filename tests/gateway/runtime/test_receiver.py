@@ -234,6 +234,52 @@ def test_a_listening_link_sends_nothing(links: Callable[[str], Link], sender: so
         sender.recv(100)
 
 
+def test_what_is_sent_to_a_source_reaches_its_peer_and_only_it(
+    links: Callable[[str], Link], sender: socket.socket
+) -> None:
+    link, radar = links("udpin:127.0.0.1:0"), links("udpin:127.0.0.1:0")
+    receiver = Receiver([link], [radar])
+    receiver.start()
+    heard = Heard(receiver)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.settimeout(20.0)
+        sender.sendto(heartbeat(1), address(link))
+        heard.until(lambda: len(heard.arrivals) == 1)
+        other.sendto(heartbeat(2), address(link))
+        heard.until(lambda: len(heard.arrivals) == 2)
+        assert receiver.send(heard.arrivals[1].source, b"to the second")
+        assert other.recv(100) == b"to the second"
+    assert not receiver.send(heard.sources[0].number, b"to a radar")
+    assert not receiver.send(99, b"to nobody")
+    receiver.close()
+    sender.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        sender.recv(100)
+    assert receiver.counters()["not sent"] == 2
+
+
+def test_several_links_and_thousands_of_frames_arrive_whole_and_each_in_its_order(
+    links: Callable[[str], Link], sender: socket.socket
+) -> None:
+    both = [links("udpin:127.0.0.1:0"), links("udpin:127.0.0.1:0")]
+    receiver = Receiver(both, [])
+    receiver.start()
+    heard = Heard(receiver)
+    sent: dict[int, list[bytes]] = {1: [], 2: []}
+    for number in range(2500):
+        for system, link in enumerate(both, start=1):
+            sent[system].append(heartbeat(system, number & 255))
+            sender.sendto(sent[system][-1], address(link))
+        if number % 50 == 49:  # never more than a small receive buffer holds
+            heard.until(lambda wanted=2 * (number + 1): len(heard.arrivals) == wanted)  # type: ignore[misc]
+    receiver.close()
+    by_source = {
+        source.number: [one.data for one in heard.arrivals if one.source == source.number] for source in heard.sources
+    }
+    assert sorted(by_source.values()) == sorted(sent.values())
+    assert receiver.counters() == {}
+
+
 def test_a_port_in_use_is_refused_with_what_to_do(links: Callable[[str], Link]) -> None:
     link = links("udpin:127.0.0.1:0")
     with pytest.raises(LinkError, match="another program has this port already; close it"):
@@ -255,6 +301,7 @@ def test_a_serial_port_that_is_not_there_is_refused_with_what_to_do() -> None:
 def test_an_error_in_the_receiving_thread_reaches_the_one_who_drains(links: Callable[[str], Link]) -> None:
     class Broken:
         url = parse_url("udpin:127.0.0.1:1")
+        patience_s = 0.01
 
         def tend(self, now_ns: int) -> None:
             raise MemoryError("no more")
