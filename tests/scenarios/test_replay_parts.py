@@ -85,7 +85,7 @@ def test_how_arrivals_fall_into_steps_changes_no_bit_of_a_part(approach: Path, t
 
 def test_muted_positions_leave_a_track_of_the_radar(talkdown: Talkdown, approach: Path, tmp_path: Path) -> None:
     """While the position source is muted nothing is updated by it, and its reports are counted."""
-    part = archived(talkdown, tmp_path, approach, "--mute", "gps:30:50")
+    part = archived(talkdown, tmp_path, approach, "--to", "55", "--mute", "gps:30:50")
     start = start_of(approach)
     rows = pq.read_table(part / "tracks.parquet", columns=["received", "updated_by"])
     stamps, by = rows["received"].cast("int64").to_pylist(), rows["updated_by"].to_pylist()
@@ -99,9 +99,9 @@ def test_muted_positions_leave_a_track_of_the_radar(talkdown: Talkdown, approach
 
 def test_a_muted_radar_leaves_the_other_alone(talkdown: Talkdown, approach: Path, tmp_path: Path) -> None:
     """The radar of this session is number 1: muting number 2 changes nothing."""
-    muted_one = archived(talkdown, tmp_path / "a", approach, "--mute", "radar:1:20:40")
-    muted_other = archived(talkdown, tmp_path / "b", approach, "--mute", "radar:2:20:40")
-    untouched = archived(talkdown, tmp_path / "c", approach)
+    muted_one = archived(talkdown, tmp_path / "a", approach, "--to", "45", "--mute", "radar:1:20:40")
+    muted_other = archived(talkdown, tmp_path / "b", approach, "--to", "45", "--mute", "radar:2:20:40")
+    untouched = archived(talkdown, tmp_path / "c", approach, "--to", "45")
     assert table(muted_other) == table(untouched)
     assert table(muted_one) != table(untouched)
 
