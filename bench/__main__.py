@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from bench.live_rates import live_rates
 from bench.lively import core_share, lateness
 from bench.measure import Figure, load, machine
 from bench.replays import help_text, ten_hours, ten_minutes
@@ -20,6 +21,7 @@ from bench.wires import wires
 
 FLEETS = (1, 30)
 THROUGHPUT_S = 120.0
+RATES_S = 60.0
 
 
 class Part(StrEnum):
@@ -29,6 +31,7 @@ class Part(StrEnum):
     help = "help"
     live = "live"
     late = "late"
+    rates = "rates"
     pipeline = "pipeline"
     wires = "wires"
     hours = "hours"
@@ -74,6 +77,9 @@ def _measure(wanted: set[Part], runs: int, seconds: float, console: Console) -> 
         if Part.late in wanted:
             say("late reports, live")
             figures += lateness(seconds)
+        if Part.rates in wanted:
+            say("50 000 messages/s and 100 vehicles, live")
+            figures += live_rates(RATES_S)
         for aircraft in FLEETS if Part.pipeline in wanted else ():
             say(f"the pipeline with {aircraft} aircraft")
             figures += throughput(aircraft, THROUGHPUT_S, min(runs, 3))
