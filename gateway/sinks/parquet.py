@@ -55,6 +55,15 @@ def whole_batches(stream: Path) -> Iterator[pa.RecordBatch]:
             yield batch
 
 
+def _completed(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
+    """A batch with null in the columns that the release which wrote it did not have yet."""
+    if batch.schema.equals(schema):
+        return batch
+    known = set(batch.schema.names)
+    columns = [batch.column(f.name) if f.name in known else pa.nulls(len(batch), f.type) for f in schema]
+    return pa.RecordBatch.from_arrays(columns, schema=schema)
+
+
 def _convert(stream: Path, target: Path, schema: pa.Schema) -> None:
     part = target.with_name(target.name + ".part")
     # numbers hardly repeat: a dictionary of them takes most of the time and of the memory, and makes the file larger
@@ -63,7 +72,7 @@ def _convert(stream: Path, target: Path, schema: pa.Schema) -> None:
         waiting: list[pa.RecordBatch] = []
         rows = 0
         for batch in whole_batches(stream):
-            waiting.append(batch)
+            waiting.append(_completed(batch, schema))
             rows += len(batch)
             if rows >= ROW_GROUP:
                 writer.write_table(pa.Table.from_batches(waiting, schema))

@@ -135,6 +135,19 @@ def test_finish_makes_parquet_of_a_cut_stream_and_takes_the_stream_away(tmp_path
     assert finish(tmp_path) == ()
 
 
+def test_a_stream_of_an_earlier_release_gets_null_in_the_columns_that_it_lacks(tmp_path, pictures):
+    archive(tmp_path, pictures(6.0))
+    stream = tmp_path / "tracks.arrows"
+    lacking = pa.Table.from_batches(whole_batches(stream)).drop_columns(["pressure_altitude_m", "callsign"])
+    with pa.ipc.new_stream(stream, lacking.schema) as writer:
+        writer.write_table(lacking)
+    finish(tmp_path)
+    table = pq.read_table(tmp_path / "tracks.parquet")
+    assert table.num_rows == lacking.num_rows > 0
+    assert table["callsign"].null_count == table.num_rows
+    assert table["height_m"].equals(lacking["height_m"])
+
+
 def test_a_stream_without_a_byte_becomes_an_empty_table(tmp_path):
     (tmp_path / "tracks.arrows").touch()
     finish(tmp_path)
