@@ -1,0 +1,295 @@
+"""The adaptive alpha-beta-gamma filter: constant acceleration between updates, every axis by itself, one gain parameter.
+
+The gains are those of `steady_gains` at gamma = p q: q comes from a table over the ratio of signal to noise, p is how far
+the last residuals exceed what was expected of them. What is known of a target over intervals and noises that change is the
+density of its acceleration's random walk, m2/s5, learnt slowly from the residuals: sigma_w^2 = density T.
+
+Beside the state runs its covariance, right for whatever gains were used: for gates and outputs, and to see where steady
+gains do not fit. After the start, after a gap, between sources of unlike quality and where velocity is measured, the gain
+follows the covariance.
+
+Arrays are (n, axes): n tracks, their axes (east, north, up at the runway centre). Nothing mixes tracks or axes.
+Source: 002-1, sections 1 and 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.estimators.steady_gains import LEAST_RATIO, gains, gamma_for, memory
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+WINDOW = 10  # residuals that p is the mean of
+LEAST_GAMMA, GREATEST_GAMMA = 1e-6, 3.5
+LEAST_DENSITY, GREATEST_DENSITY = 1e-6, 1e6  # m2/s5
+GREATEST_LESSON = (
+    9.0  # normalised squared residual: what a manoeuvre or an outlier teaches of the calm target is bounded
+)
+SHORTEST_S = 1e-3  # that a fixed q is taken over
+UNKNOWN_SPEED_MPS, UNKNOWN_ACCELERATION_MPS2 = 100.0, 5.0  # sigmas of what is not measured at the start
+
+
+@dataclass(frozen=True, slots=True)
+class Tuning:
+    """What the filter assumes; the defaults serve drones and jets, since density and p follow the target."""
+
+    q: float | None = None  # of a calm target, fixed; None = from the table
+    density: float = 1.0  # m2/s5 at the start: growth of the acceleration's variance a second
+    learning: float = 0.02  # of the logarithm of the density, for each unit of surprise; 0 = never
+    least_p: float = 0.3  # without a floor a target without noise would freeze the filter
+    greatest_p: float = 30.0
+    follows_covariance: bool = True  # False: the steady gains from the first update on, as printed
+    robust: float | None = None  # sigmas beyond which a residual pulls no more
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """n tracks: position m, velocity m/s, acceleration m/s2 (n, axes) now; the rest as it was at each axis's last update.
+
+    `terms` (6, n, axes): the covariance in the order ss, sv, sa, vv, va, aa.
+    """
+
+    position: Floats
+    velocity: Floats
+    acceleration: Floats
+    terms: Floats
+    since_s: Floats  # (n, axes) since the last update
+    density: Floats  # (n, axes) m2/s5, of the calm target
+    surprises: Floats  # (WINDOW, n, axes) squared residuals over what was expected, latest last
+    p: Floats  # (n, axes) their mean within its bounds
+
+
+@dataclass(frozen=True, slots=True)
+class Innovation:
+    """What measurements told n tracks, component by component (n, m): m is the axes, twice with a velocity.
+
+    The velocity's residuals are those left after the position. Components that were not measured have residual 0 and unit
+    variance, so that they add nothing anywhere.
+    """
+
+    innovation: Floats
+    variance: Floats
+    measured: Bools
+    outlying: Bools  # (n,) so far out, on some axis, that the pull was bounded
+    gamma: Floats  # (n, axes) the gain parameter
+
+    @property
+    def normalised(self) -> Floats:
+        """Squared residuals over their variances, summed, (n,): chi-square with as many degrees as were measured."""
+        return np.asarray((self.innovation * self.innovation / self.variance).sum(axis=-1))
+
+    @property
+    def covariance(self) -> Floats:
+        """The residuals' covariance (n, m, m), diagonal."""
+        return np.asarray(self.variance[..., None] * np.eye(self.variance.shape[-1]))
+
+    @property
+    def log_likelihood(self) -> Floats:
+        """Natural logarithm of the density of the measured components, (n,)."""
+        degrees = self.measured.sum(axis=-1)
+        return np.asarray(-0.5 * (self.normalised + np.log(self.variance).sum(axis=-1) + degrees * np.log(2.0 * np.pi)))
+
+
+def start(
+    position: Floats,
+    sigma: Floats,
+    tuning: Tuning,
+    velocity: Floats | None = None,
+    velocity_sigma: Floats | float = UNKNOWN_SPEED_MPS,
+) -> Estimate:
+    """First states of n tracks at positions with sigmas, and velocities with sigmas where known (NaN = not), (n, axes)."""
+    zero = np.zeros_like(position)
+    known = np.zeros(position.shape, dtype=np.bool_) if velocity is None else ~np.isnan(velocity)
+    spread = np.where(known, velocity_sigma, UNKNOWN_SPEED_MPS)
+    sure = np.full_like(zero, UNKNOWN_ACCELERATION_MPS2**2)
+    terms = np.stack([sigma * sigma, zero, zero, spread * spread, zero, sure])
+    speed = zero if velocity is None else np.where(known, velocity, 0.0)
+    density = np.full_like(zero, tuning.density)
+    one = np.ones_like(zero)
+    return Estimate(position, speed, zero, terms, zero, density, np.ones((WINDOW, *zero.shape)), one)
+
+
+def predict(state: Estimate, elapsed_s: Floats) -> Estimate:
+    """The states `elapsed_s` (n,), not negative, later; two short steps equal one long one. Source: 002-1, eq 2."""
+    t = elapsed_s[:, None]
+    velocity = state.velocity + t * state.acceleration
+    position = state.position + (0.5 * t) * (state.velocity + velocity)
+    since = state.since_s + t
+    return Estimate(position, velocity, state.acceleration, state.terms, since, state.density, state.surprises, state.p)
+
+
+def covariance(state: Estimate) -> Floats:
+    """The covariance now as matrices (n, axes, 3, 3) over position, velocity, acceleration of each axis."""
+    now = _carried(state, state.density)[_ROW, _COLUMN]
+    return np.moveaxis(now[_PLACES], (0, 1), (-2, -1))
+
+
+def track_covariance(state: Estimate) -> Floats:
+    """The covariance now as matrices (n, 2 axes, 2 axes) over the positions and then the velocities; axes are independent."""
+    now = _carried(state, state.density)
+    along, axes = np.arange(now.shape[-1]), now.shape[-1]
+    matrix = np.zeros((*now.shape[2:-1], 2 * axes, 2 * axes))
+    matrix[..., along, along], matrix[..., along + axes, along + axes] = now[0, 0], now[1, 1]
+    matrix[..., along, along + axes] = matrix[..., along + axes, along] = now[0, 1]
+    return matrix
+
+
+def _carried(state: Estimate, density: Floats) -> Floats:
+    """The covariance now, (3, 3, n, axes): that of the last update, over the interval since."""
+    t = state.since_s
+    half = 0.5 * t
+    now: Floats = state.terms[_PLACES]
+    # The step of the acceleration comes before the interval. It grows as p does where gamma is small; a p below 1, of ten
+    # residuals, is luck as often as not, and makes nothing surer.
+    now[2, 2] += np.square(np.maximum(state.p, 1.0)) * density * t
+    now[0] += t * (now[1] + half * now[2])
+    now[1] += t * now[2]
+    now[:, 0] += t * (now[:, 1] + half * now[:, 2])
+    now[:, 1] += t * now[:, 2]
+    return now
+
+
+_PLACES = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
+_ROW, _COLUMN = np.triu_indices(3)
+
+
+def update(
+    state: Estimate,
+    position: Floats,
+    sigma: Floats,
+    tuning: Tuning,
+    velocity: Floats | None = None,
+    velocity_sigma: Floats | float = UNKNOWN_SPEED_MPS,
+    share: Floats | None = None,
+) -> tuple[Estimate, Innovation]:
+    """States after positions with sigmas (n, axes), and velocities where there are any; NaN components are left out.
+
+    `share` (n, axes), in [0, 1]: how much of an axis was measured, where a component of a plot was missing and the
+    prediction's own value stands in for it; None = all. What stands in does not make a state surer of itself.
+    Source: 002-1, sections 1 and 2.2. Deviation: the gain may follow the covariance; `Tuning.follows_covariance`.
+    """
+    measured = ~np.isnan(position) if share is None else ~np.isnan(position) & (share > 0.0)
+    whole = bool(measured.all())
+    y, noise = position - state.position, sigma * sigma
+    if not whole:
+        y, noise = np.where(measured, y, 0.0), np.where(measured, noise, 1.0)
+    density, interval, q = _calm(state, noise, tuning)
+    gamma = np.minimum(np.maximum(state.p * q, LEAST_GAMMA), GREATEST_GAMMA)
+    prior = _carried(state, density)
+    cross = prior[0] if share is None else share * prior[0]
+    s = noise + (cross[0] if share is None else share * cross[0])
+    gain = _gain(gamma, interval, share, cross, s, velocity, tuning)
+    squared = y * y
+    learnt = measured if share is None else measured & (share == 1.0)
+    expected = s if tuning.follows_covariance else noise / np.square(memory(q))
+    surprises, p, density = _lessons(state, density, squared / expected, learnt, tuning)
+    told = Innovation(y, s if whole else np.where(measured, s, 1.0), measured, np.zeros(len(y), dtype=np.bool_), gamma)
+    if tuning.robust is not None:
+        pull = tuning.robust / np.sqrt(np.maximum(squared / s, tuning.robust**2))
+        gain, s = gain * pull, s / (pull * pull)
+        told = replace(told, outlying=(pull < 1.0).any(axis=-1))
+    terms = _reduced(prior, cross, s, gain)
+    mean = np.array((state.position, state.velocity, state.acceleration))
+    after = mean + gain * y
+    touched = measured
+    if velocity is not None:
+        terms = np.where(measured, terms, prior[_ROW, _COLUMN])
+        after, terms, told = _with_velocity(np.where(measured, after, mean), terms, velocity, velocity_sigma, told)
+        touched = measured | ~np.isnan(velocity)
+    since = np.zeros_like(y)
+    if not touched.all():
+        after, terms = np.where(touched, after, mean), np.where(touched, terms, state.terms)
+        since = np.where(touched, since, state.since_s)
+    return Estimate(after[0], after[1], after[2], terms, since, density, surprises, p), told
+
+
+def _gain(
+    gamma: Floats,
+    interval: Floats,
+    share: Floats | None,
+    cross: Floats,
+    s: Floats,
+    velocity: Floats | None,
+    tuning: Tuning,
+) -> Floats:
+    """The gains (3, n, axes): steady ones, or the covariance's own where it knows the position worse, or a velocity too."""
+    gain = gains(gamma, interval) if share is None else share * gains(gamma, interval)
+    if not tuning.follows_covariance:
+        return gain
+    own = cross / s
+    follows = own[0] > gain[0]
+    if velocity is not None:
+        follows |= ~np.isnan(velocity)
+    return np.where(follows, own, gain)
+
+
+def _reduced(prior: Floats, cross: Floats, s: Floats, gain: Floats) -> Floats:
+    """The terms (6, n, axes) after any gains: those after the best gains, and what these cost for being others.
+
+    `cross` (3, n, axes) is the state's covariance with the residual, `s` (n, axes) the residual's variance. Equal to Joseph's
+    form, symmetric by construction.
+    """
+    root = np.sqrt(s)
+    told = cross / root
+    off = gain * root - told
+    return np.asarray(prior[_ROW, _COLUMN] - told[_ROW] * told[_COLUMN] + off[_ROW] * off[_COLUMN])
+
+
+def _calm(state: Estimate, noise: Floats, tuning: Tuning) -> tuple[Floats, Floats, Floats]:
+    """The density that holds for the interval, the interval that its gains are taken for (s), and q, all (n, axes)."""
+    t = state.since_s
+    if tuning.q is not None:
+        q = np.full_like(t, tuning.q)
+        interval = np.maximum(t, SHORTEST_S)
+        ratio = q / (2.0 * memory(q))
+        return ratio * ratio * noise / interval**5, interval, q
+    squares = t * t
+    ratio = state.density * (squares * squares * t) / noise
+    if (ratio < LEAST_RATIO**2).any():
+        # At almost the same instant gains would not fall with the interval any more, but 1 / T would grow.
+        t = np.maximum(t, (LEAST_RATIO**2 * noise / state.density) ** 0.2)
+        ratio = np.maximum(ratio, LEAST_RATIO**2)
+    return state.density, t, gamma_for(ratio)
+
+
+def _lessons(
+    state: Estimate, density: Floats, surprise: Floats, measured: Bools, tuning: Tuning
+) -> tuple[Floats, Floats, Floats]:
+    """The last surprises, p, and the density after squared residuals over what was expected of them (n, axes)."""
+    surprise = np.minimum(surprise, tuning.greatest_p)
+    surprises = np.concatenate([state.surprises[1:], surprise[None]])
+    if tuning.q is None and tuning.learning:
+        lesson = np.exp(tuning.learning * (np.minimum(surprise, GREATEST_LESSON) - 1.0))
+        taught = np.minimum(np.maximum(density * lesson, LEAST_DENSITY), GREATEST_DENSITY)
+        density = taught if measured.all() else np.where(measured, taught, density)
+    if not measured.all():
+        surprises = np.where(measured, surprises, state.surprises)
+    p = surprises.sum(axis=0) / WINDOW
+    return surprises, np.minimum(np.maximum(p, tuning.least_p), tuning.greatest_p), density
+
+
+def _with_velocity(
+    mean: Floats, terms: Floats, velocity: Floats, sigma: Floats | float, told: Innovation
+) -> tuple[Floats, Floats, Innovation]:
+    """Means (3, n, axes) and covariances (6, n, axes) after velocities too, with the covariance's own gains."""
+    measured = ~np.isnan(velocity)
+    y = np.where(measured, velocity - mean[1], 0.0)
+    noise = np.where(measured, np.square(sigma), 1.0)
+    ss, sv, sa, vv, va, aa = terms
+    s = vv + noise
+    by_s, _, by_a = gain = np.stack([sv, vv, va]) / s
+    kept = noise / s
+    less = np.stack([ss - by_s * sv, sv * kept, sa - by_s * va, vv * kept, va * kept, aa - by_a * va])
+    both = Innovation(
+        np.concatenate([told.innovation, y], axis=-1),
+        np.concatenate([told.variance, np.where(measured, s, 1.0)], axis=-1),
+        np.concatenate([told.measured, measured], axis=-1),
+        told.outlying,
+        told.gamma,
+    )
+    return mean + gain * y, np.where(measured, less, terms), both
