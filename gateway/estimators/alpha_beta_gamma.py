@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.estimators.axis_covariance import PLACES, Terms, carried, reduced, settled, with_velocity
 from gateway.estimators.steady_gains import LEAST_RATIO, gains, gamma_for, memory
 
 Floats = NDArray[np.float64]
@@ -43,7 +44,9 @@ class Tuning:
     learning: float = 0.02  # of the logarithm of the density, for each unit of surprise; 0 = never
     least_p: float = 0.3  # without a floor a target without noise would freeze the filter
     greatest_p: float = 30.0
-    follows_covariance: bool = True  # False: the steady gains from the first update on, as printed
+    follows_covariance: bool = (
+        True  # False: as printed, gains and covariance of the steady state from the first update on
+    )
     robust: float | None = None  # sigmas beyond which a residual pulls no more
 
 
@@ -125,37 +128,26 @@ def predict(state: Estimate, elapsed_s: Floats) -> Estimate:
 
 def covariance(state: Estimate) -> Floats:
     """The covariance now as matrices (n, axes, 3, 3) over position, velocity, acceleration of each axis."""
-    now = _carried(state, state.density)[_ROW, _COLUMN]
-    return np.moveaxis(now[_PLACES], (0, 1), (-2, -1))
+    return np.moveaxis(np.array(_now(state, state.density))[PLACES], (0, 1), (-2, -1))
 
 
 def track_covariance(state: Estimate) -> Floats:
     """The covariance now as matrices (n, 2 axes, 2 axes) over the positions and then the velocities; axes are independent."""
-    now = _carried(state, state.density)
-    along, axes = np.arange(now.shape[-1]), now.shape[-1]
-    matrix = np.zeros((*now.shape[2:-1], 2 * axes, 2 * axes))
-    matrix[..., along, along], matrix[..., along + axes, along + axes] = now[0, 0], now[1, 1]
-    matrix[..., along, along + axes] = matrix[..., along + axes, along] = now[0, 1]
+    ss, sv, _, vv, _, _ = _now(state, state.density)
+    axes = ss.shape[-1]
+    along = np.arange(axes)
+    matrix = np.zeros((*ss.shape[:-1], 2 * axes, 2 * axes))
+    matrix[..., along, along], matrix[..., along + axes, along + axes] = ss, vv
+    matrix[..., along, along + axes] = matrix[..., along + axes, along] = sv
     return matrix
 
 
-def _carried(state: Estimate, density: Floats) -> Floats:
-    """The covariance now, (3, 3, n, axes): that of the last update, over the interval since."""
-    t = state.since_s
-    half = 0.5 * t
-    now: Floats = state.terms[_PLACES]
-    # The step of the acceleration comes before the interval. It grows as p does where gamma is small; a p below 1, of ten
-    # residuals, is luck as often as not, and makes nothing surer.
-    now[2, 2] += np.square(np.maximum(state.p, 1.0)) * density * t
-    now[0] += t * (now[1] + half * now[2])
-    now[1] += t * now[2]
-    now[:, 0] += t * (now[:, 1] + half * now[:, 2])
-    now[:, 1] += t * now[:, 2]
-    return now
-
-
-_PLACES = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
-_ROW, _COLUMN = np.triu_indices(3)
+def _now(state: Estimate, density: Floats) -> Terms:
+    """The covariance's terms now, each (n, axes): those of the last update, over the interval since."""
+    # The step grows as p does where gamma is small. A p below 1, of ten residuals, is luck as often as not, and makes
+    # nothing surer.
+    step = np.square(np.maximum(state.p, 1.0)) * density * state.since_s
+    return carried(state.terms, state.since_s, step)
 
 
 def update(
@@ -180,26 +172,32 @@ def update(
         y, noise = np.where(measured, y, 0.0), np.where(measured, noise, 1.0)
     density, interval, q = _calm(state, noise, tuning)
     gamma = np.minimum(np.maximum(state.p * q, LEAST_GAMMA), GREATEST_GAMMA)
-    prior = _carried(state, density)
-    cross = prior[0] if share is None else share * prior[0]
-    s = noise + (cross[0] if share is None else share * cross[0])
-    gain = _gain(gamma, interval, share, cross, s, velocity, tuning)
+    if tuning.follows_covariance:
+        prior = _now(state, density)
+        cross = np.array(prior[:3]) if share is None else share * np.array(prior[:3])
+        s = noise + (cross[0] if share is None else share * cross[0])
+        gain = _followed(gains(gamma, interval), share, cross / s, velocity)
+        expected = s
+    else:
+        gain = gains(gamma, interval)
+        s, expected = noise / (1.0 - gain[0]), noise / np.square(memory(q))
+        gain = gain if share is None else share * gain
     squared = y * y
     learnt = measured if share is None else measured & (share == 1.0)
-    expected = s if tuning.follows_covariance else noise / np.square(memory(q))
     surprises, p, density = _lessons(state, density, squared / expected, learnt, tuning)
     told = Innovation(y, s if whole else np.where(measured, s, 1.0), measured, np.zeros(len(y), dtype=np.bool_), gamma)
     if tuning.robust is not None:
         pull = tuning.robust / np.sqrt(np.maximum(squared / s, tuning.robust**2))
         gain, s = gain * pull, s / (pull * pull)
         told = replace(told, outlying=(pull < 1.0).any(axis=-1))
-    terms = _reduced(prior, cross, s, gain)
+    terms = reduced(prior, cross, s, gain) if tuning.follows_covariance else settled(gamma, interval, noise)
     mean = np.array((state.position, state.velocity, state.acceleration))
     after = mean + gain * y
     touched = measured
     if velocity is not None:
-        terms = np.where(measured, terms, prior[_ROW, _COLUMN])
-        after, terms, told = _with_velocity(np.where(measured, after, mean), terms, velocity, velocity_sigma, told)
+        if not whole:
+            after, terms = np.where(measured, after, mean), np.where(measured, terms, _now(state, density))
+        after, terms, told = _sped(after, terms, velocity, velocity_sigma, told)
         touched = measured | ~np.isnan(velocity)
     since = np.zeros_like(y)
     if not touched.all():
@@ -208,46 +206,23 @@ def update(
     return Estimate(after[0], after[1], after[2], terms, since, density, surprises, p), told
 
 
-def _gain(
-    gamma: Floats,
-    interval: Floats,
-    share: Floats | None,
-    cross: Floats,
-    s: Floats,
-    velocity: Floats | None,
-    tuning: Tuning,
-) -> Floats:
+def _followed(steady: Floats, share: Floats | None, own: Floats, velocity: Floats | None) -> Floats:
     """The gains (3, n, axes): steady ones, or the covariance's own where it knows the position worse, or a velocity too."""
-    gain = gains(gamma, interval) if share is None else share * gains(gamma, interval)
-    if not tuning.follows_covariance:
-        return gain
-    own = cross / s
+    gain = steady if share is None else share * steady
     follows = own[0] > gain[0]
     if velocity is not None:
         follows |= ~np.isnan(velocity)
     return np.where(follows, own, gain)
 
 
-def _reduced(prior: Floats, cross: Floats, s: Floats, gain: Floats) -> Floats:
-    """The terms (6, n, axes) after any gains: those after the best gains, and what these cost for being others.
-
-    `cross` (3, n, axes) is the state's covariance with the residual, `s` (n, axes) the residual's variance. Equal to Joseph's
-    form, symmetric by construction.
-    """
-    root = np.sqrt(s)
-    told = cross / root
-    off = gain * root - told
-    return np.asarray(prior[_ROW, _COLUMN] - told[_ROW] * told[_COLUMN] + off[_ROW] * off[_COLUMN])
-
-
 def _calm(state: Estimate, noise: Floats, tuning: Tuning) -> tuple[Floats, Floats, Floats]:
     """The density that holds for the interval, the interval that its gains are taken for (s), and q, all (n, axes)."""
     t = state.since_s
     if tuning.q is not None:
-        q = np.full_like(t, tuning.q)
+        q = np.array(tuning.q)
         interval = np.maximum(t, SHORTEST_S)
-        ratio = q / (2.0 * memory(q))
-        return ratio * ratio * noise / interval**5, interval, q
+        squares = interval * interval
+        return np.square(q / (2.0 * memory(q))) * noise / (squares * squares * interval), interval, q
     squares = t * t
     ratio = state.density * (squares * squares * t) / noise
     if (ratio < LEAST_RATIO**2).any():
@@ -273,18 +248,13 @@ def _lessons(
     return surprises, np.minimum(np.maximum(p, tuning.least_p), tuning.greatest_p), density
 
 
-def _with_velocity(
+def _sped(
     mean: Floats, terms: Floats, velocity: Floats, sigma: Floats | float, told: Innovation
 ) -> tuple[Floats, Floats, Innovation]:
-    """Means (3, n, axes) and covariances (6, n, axes) after velocities too, with the covariance's own gains."""
+    """Means (3, n, axes) and terms (6, n, axes) after velocities too, with the covariance's own gains."""
     measured = ~np.isnan(velocity)
     y = np.where(measured, velocity - mean[1], 0.0)
-    noise = np.where(measured, np.square(sigma), 1.0)
-    ss, sv, sa, vv, va, aa = terms
-    s = vv + noise
-    by_s, _, by_a = gain = np.stack([sv, vv, va]) / s
-    kept = noise / s
-    less = np.stack([ss - by_s * sv, sv * kept, sa - by_s * va, vv * kept, va * kept, aa - by_a * va])
+    gain, s, less = with_velocity(terms, np.where(measured, np.square(sigma), 1.0))
     both = Innovation(
         np.concatenate([told.innovation, y], axis=-1),
         np.concatenate([told.variance, np.where(measured, s, 1.0)], axis=-1),

@@ -5,8 +5,8 @@ gamma / (2 T^2). With r = sqrt(1 - alpha): beta = 2 (1 - r)^2, gamma = 4 (1 - r)
 These are the steady gains of the Kalman filter of a target whose acceleration takes a random step (sigma_w) before each
 interval, and gamma / (2 r) = sigma_w T^2 / sigma_v, the ratio of signal to noise.
 
-The table is the gain parameter of least mean square error, made by simulation, by docs/decisions/alpha_beta_gamma_table.py; the closed form gives the same error to 0.02 % at the
-entries, and what is read between them costs 0.4 % at most.
+The table is the gain parameter of least mean square error, by simulation: docs/decisions/alpha_beta_gamma_table.py. At its
+entries the closed form has the same error to 0.02 %; what is read between them costs 0.4 % at most.
 """
 
 from __future__ import annotations
