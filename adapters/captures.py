@@ -11,14 +11,19 @@ from adapters import Arrival, Source
 from adapters.kinds import FileError
 from adapters.mavlink_frames import FrameScanner
 from adapters.pcap import Captured, PcapReader
-from adapters.tlog import STEP_NS
+from adapters.tlog import SECOND, STEP_NS
 
+_JUMP_NS = 3_600 * SECOND  # a single stamp further off than this is damage
+_YEAR_2200 = 7_258_118_400 * SECOND
 _LOOK_AT = 2000  # datagrams of a capture that are looked at to tell what it holds
 
 
 @dataclass(slots=True)
 class CaptureRecording:
-    """A capture: its sources, numbered from `first_number`, and its arrivals. Raises FileError where it holds neither."""
+    """A capture: its sources, numbered from `first_number`, and its arrivals. Raises FileError where it holds neither.
+
+    Counters: those of PcapReader and FrameScanner, "bad timestamps", "other datagrams".
+    """
 
     path: Path
     first_number: int = 0
@@ -59,7 +64,7 @@ class CaptureRecording:
     def _captured(self, reader: PcapReader) -> Iterator[Arrival]:
         scanners: dict[str, FrameScanner] = {}
         last = -1
-        for captured in reader:
+        for stamp, captured in _stamped(reader):
             sender = _sender_of(captured)
             number = self._numbers.get(sender) if sender is not None else self._numbers.get(captured.sender)
             if sender is None and number is None and self._radar_only():
@@ -74,11 +79,27 @@ class CaptureRecording:
                 scanner = scanners.setdefault(captured.sender, FrameScanner(self.counters))
                 parts = scanner.feed_datagram(captured.data)
             for part in parts:
-                last = max(captured.received_at // STEP_NS * STEP_NS, last + STEP_NS if last >= 0 else 0)
+                last = max(stamp // STEP_NS * STEP_NS, last + STEP_NS if last >= 0 else 0)
                 yield Arrival(last, number, part, captured.sender if is_radar else "")
 
     def _radar_only(self) -> bool:
         return len(self.sources) == 1 and self.sources[0].kind == "radar"
+
+
+def _stamped(reader: PcapReader) -> Iterator[tuple[int, Captured]]:
+    """Each datagram with its stamp; one that cannot be, or leaps by more than an hour and back, takes the one before."""
+    datagrams, before = iter(reader), -1
+    held = next(datagrams, None)
+    while held is not None:
+        coming, stamp = next(datagrams, None), held.received_at
+        returns = before >= 0 and coming is not None and abs(coming.received_at - before) < _JUMP_NS
+        if not 0 <= stamp < _YEAR_2200 or (returns and abs(stamp - before) > _JUMP_NS):
+            reader.counters["bad timestamps"] += 1
+            stamp = max(before, 0)
+        else:
+            before = stamp
+        yield stamp, held
+        held = coming
 
 
 def _senders(reader: PcapReader) -> list[str]:

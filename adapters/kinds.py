@@ -113,4 +113,6 @@ def _is_json(beginning: bytes) -> bool:
         json.JSONDecoder().raw_decode(beginning.decode("utf-8", "ignore").lstrip())
     except ValueError:
         return len(beginning) == _BEGINNING  # cut by us, most likely
+    except RecursionError:  # nested deeper than anything that is one
+        return False
     return True

@@ -36,9 +36,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-Reason = Literal["length", "magic", "version", "checksum", "kind", "radar", "tag", "replayed", "value", "duplicate"]
+Reason = Literal[
+    "length", "magic", "version", "checksum", "kind", "radar", "tag", "too many radars", "replayed", "value", "duplicate",
+]  # fmt: skip
 REASONS: tuple[Reason, ...] = (
-    "length", "magic", "version", "checksum", "kind", "radar", "tag", "replayed", "value", "duplicate",
+    "length", "magic", "version", "checksum", "kind", "radar", "tag", "too many radars", "replayed", "value", "duplicate",
 )  # fmt: skip
 STATES = ("off", "standby", "operating", "fault")
 MODES = ("search", "precision approach")

@@ -89,7 +89,13 @@ class MavlinkObserver:
         if system == 0:
             counters["system 0"] += 1
             return ()
-        component = self.registry.component(source, system, frame.component)
+        key = (source, system, frame.component)
+        if frame.verdict == "bad checksum" and key not in self.registry.components:
+            return ()  # damage is nobody new
+        component = self.registry.component(*key)
+        if component is None:
+            counters["too many components"] += 1
+            return ()
         component.sequence.hear(frame.sequence, message, counters)
         if frame.verdict != "good":
             return ()

@@ -13,6 +13,7 @@ SECOND = 10**9
 BUCKET_NS = 30 * SECOND
 _MILLISECOND = 10**6
 _SPEED_WINDOW_NS = 2 * SECOND
+_FASTEST = 1000.0  # faster than any simulator: times that are none
 _FINE = 16  # delays below 16 ms are counted by the millisecond, longer ones in eighths of an octave
 _CELLS = 152  # up to 2^21 ms, 35 minutes
 _LEAST_DELAYS = 20
@@ -111,6 +112,8 @@ class SpeedMeter:
             return
         ratio = (source_ns - self._begin[1]) / elapsed
         self._begin = (received_at, source_ns)
+        if ratio > _FASTEST:
+            return
         self._ratios.append(ratio)
         lately = list(self._ratios)[-self.needed :]
         if 0.8 <= ratio <= 1.25:

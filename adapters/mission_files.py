@@ -111,6 +111,8 @@ def _of_plan(path: Path, text: str) -> tuple[list[_Item], tuple[PlanPoint, ...]]
         raise MissionFileError(f"{path}, line {error.lineno}: this is not JSON ({error.msg.lower()}).") from error
     except RecursionError as error:
         raise MissionFileError(f"{path} is no plan: it is nested too deeply.") from error
+    except ValueError as error:
+        raise MissionFileError(f"{path} is no plan: a number in it has thousands of digits.") from error
     mission = _part(document, "mission", dict, f"{path}")
     planned = mission.get("plannedHomePosition")
     home = () if planned is None else _home(_place(planned, f"{path}, plannedHomePosition"))

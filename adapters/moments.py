@@ -25,6 +25,7 @@ _GREATEST_UNIX_USEC = 7_258_118_400 * 10**6  # 2200
 _WRAP_NS = (1 << 32) * 10**6
 _STRAY_NS = 10 * SECOND  # a time this far from the component's newest is not of this boot
 _SETTLED_NS = 15 * SECOND
+_FOREIGN_AT_MOST = 256  # names; of drones anybody can make up any number
 
 
 @dataclass(slots=True)
@@ -139,7 +140,7 @@ class Moments:
         return now + apart, timing
 
     def _say_foreign(self, key: object, name: str, lag_s: float) -> None:
-        if key in self._foreign:
+        if key in self._foreign or len(self._foreign) >= _FOREIGN_AT_MOST:
             return
         self._foreign.add(key)
         side = "behind" if lag_s > 0 else "ahead of"

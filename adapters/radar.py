@@ -22,6 +22,9 @@ _RESTART_NS = 10**9  # within the window, only a datagram this much newer than e
 _SILENT_NS = 10 * 10**9  # a sender that was silent this long has been replaced, not doubled
 _FASTEST_HZ = 1000  # a jump ahead by more than the window that no radar could have sent is a restart, not a loss
 _WRAP = 1 << 32
+_RADARS_AT_MOST = 64  # without a key; the numbers of more are made up
+_SENDERS_AT_MOST = 64  # of one radar; the one silent for longest is forgotten
+_NAMED_AT_MOST = 16  # senders of one radar that are told by name
 
 
 @dataclass(slots=True)
@@ -77,7 +80,19 @@ class _Window:
 @dataclass(slots=True)
 class _Radar:
     windows: dict[Hashable, _Window] = field(default_factory=dict)
-    senders: dict[Hashable, tuple[str, int]] = field(default_factory=dict)  # name, session time when last heard
+    senders: dict[Hashable, tuple[str, int]] = field(
+        default_factory=dict
+    )  # name, session time when last heard; newest last
+    named: int = 0
+
+    def hear_sender(self, peer: Hashable, name: str, now: int) -> None:
+        """Take note of who has sent; of too many the longest silent is forgotten."""
+        self.senders.pop(peer, None)
+        self.senders[peer] = (name, now)
+        if len(self.senders) > _SENDERS_AT_MOST:
+            silent = next(iter(self.senders))
+            del self.senders[silent]
+            self.windows.pop(silent, None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,8 +128,13 @@ class LandingRadarReceiver:
             return header
         if key is not None and self.live and abs(header.time - session_time) > LIVE_LIMIT_NS:
             return "replayed"
-        radar = self._radars.setdefault(header.radar, _Radar())
-        window = radar.windows.setdefault(None if key is not None else sender, _Window())
+        radar = self._radars.get(header.radar)
+        if radar is None:
+            if key is None and len(self._radars) >= _RADARS_AT_MOST + len(self.keys):
+                return "too many radars"
+            radar = _Radar()
+        place = None if key is not None else sender
+        window = radar.windows.get(place) or _Window()
         before = (window.newest, window.newest_time, window.floor_time, window.seen)
         refused, kind, lost = window.place(header.sequence, header.time, key is not None)
         if refused is not None:
@@ -123,6 +143,7 @@ class LandingRadarReceiver:
         if isinstance(found, str):  # a datagram that is refused leaves no trace in the window
             window.newest, window.newest_time, window.floor_time, window.seen = before
             return found
+        self._radars[header.radar], radar.windows[place] = radar, window
         self.counters["lost"] += lost
         if kind:
             self.counters[kind] += 1
@@ -141,7 +162,10 @@ class LandingRadarReceiver:
                 notes.append(("warning", text))
             elif radar.senders:
                 notes.append(("info", f"Radar {header.radar} is now sent by {name}."))
-        radar.senders[peer] = (name, now)
+            radar.named += 1
+            if radar.named > _NAMED_AT_MOST:
+                notes.clear()
+        radar.hear_sender(peer, name, now)
         if kind == "restarted":
             notes.append(("info", f"Radar {header.radar} has restarted: its sequence numbers begin anew."))
         return tuple(notes)

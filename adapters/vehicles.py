@@ -39,6 +39,7 @@ _ALIVE_NS = 5 * 10**9
 _TELLS_NS = 3 * 10**9  # after so long a silence another link's word is taken
 _REMEMBERED = 256
 _TIMES = 1024
+_COMPONENTS_AT_MOST = 2048  # of a session; each holds a clock, some 9 kB
 
 
 @dataclass(slots=True)
@@ -111,15 +112,22 @@ class Registry:
     origins: dict[int, str]
     notes: list[tuple[str, str]]
     components: dict[tuple[int, int, int], Component] = field(default_factory=dict)
+    _is_full: bool = False
     _siblings: dict[tuple[int, int], Siblings] = field(default_factory=dict)
     _members: dict[int, dict[int, _Member]] = field(default_factory=dict)  # by system, then by source
     _vehicles: dict[int, list[Vehicle]] = field(default_factory=dict)
 
-    def component(self, source: int, system: int, component: int) -> Component:
-        """The component of this key; new ones begin with their role by custom."""
+    def component(self, source: int, system: int, component: int) -> Component | None:
+        """The component of this key; new ones begin with their role by custom. None for a new one where there are too many."""
         key = (source, system, component)
         known = self.components.get(key)
         if known is None:
+            if len(self.components) >= _COMPONENTS_AT_MOST:
+                if not self._is_full:
+                    self._is_full = True
+                    text = f"More than {_COMPONENTS_AT_MOST} senders speak MAVLink: new ones are counted, not heard."
+                    self.notes.append(("warning", text))
+                return None
             clock = SourceClock(key)
             sequence = SequenceCheck(self._siblings.setdefault(key[:2], Siblings()))
             known = self.components[key] = Component(key, component == 1, by_number(component), clock, sequence)

@@ -180,12 +180,14 @@ class Work:
                 f"radar {status.radar} is not in the site file: it is taken to stand where its status says", "info"
             )
         elif text := align.contradiction(known, said):
-            self.once(f"radar {status.radar} says that it {text} than the site file says: the site file is used")
+            told = f"radar {status.radar} says that it {text} than the site file says: the site file is used"
+            self.once(told, topic=f"where radar {status.radar} stands")
 
     def _judge_heights(self) -> None:
         if abs(self.geoid.contradiction_m) > CONTRADICTION_M:
             off_m = self.geoid.contradiction_m
-            self.once(f"the streams' geoid separation is {off_m:+.0f} m from the site file's: the site file's is used")
+            told = f"the streams' geoid separation is {off_m:+.0f} m from the site file's: the site file's is used"
+            self.once(told, topic="the geoid")
         elif self.geoid.site_m is None and not self.geoid.seen_m:
             self.once(
                 "neither site nor stream gives the geoid separation: heights are those above mean sea level", "info"
@@ -308,10 +310,11 @@ class Work:
         """One more for a reason."""
         self.counters[reason] = self.counters.get(reason, 0) + by
 
-    def once(self, text: str, level: str = "warning") -> None:
-        """Say something, the first time only."""
-        if text not in self.said:
-            self.said |= {text}
+    def once(self, text: str, level: str = "warning", topic: str = "") -> None:
+        """Say something, the first time only; of a topic only the first, whatever numbers are in it."""
+        about = topic or text
+        if about not in self.said:
+            self.said |= {about}
             self.events.append(Event(self.now or 0, level, text))
 
     def picture(self, health: Health) -> tuple[State, Picture]:

@@ -17,11 +17,14 @@ from pathlib import Path
 from typing import Any, cast
 
 from adapters import Kind, Source
+from gateway.runtime.typed import misfit
 from gateway.settings import Mute, Options
 
 SESSION_FILE = "session.json"
 INPUTS = "inputs"
 FORMAT = 1
+_YEAR_2200 = 7_258_118_400 * 10**9
+_LEAST, _LARGEST = 1e-3, 1e6  # of an option's seconds, sigmas and counts
 _LEAST_FREE_BYTES = 32 << 20  # below, a session would end before it was worth anything
 
 
@@ -125,7 +128,7 @@ def read_record(folder: Path) -> Record:
         document = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise FolderError(f"{folder} is no session: it has no {SESSION_FILE}.") from error
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise FolderError(
             f"{path} cannot be read ({error}); the session's inputs can still be replayed one by one."
         ) from error
@@ -133,7 +136,7 @@ def read_record(folder: Path) -> Record:
         raise FolderError(f"{path} is not of a format that this version of Talkdown knows.")
     try:
         return _record(document)
-    except (KeyError, TypeError, AttributeError) as error:
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise FolderError(f"{path} lacks or spoils what a session needs ({error}).") from error
 
 
@@ -143,7 +146,29 @@ def _record(document: dict[str, Any]) -> Record:
     plain["command"] = tuple(document["command"])
     plain["options"] = read_options(document["options"])
     plain["sources"] = tuple(_input_file(row) for row in document["sources"])
-    return Record(**plain)
+    record = Record(**plain)
+    numbers = [source.number for source in record.sources]
+    spoiled = misfit(record) or _out_of_range(record) or ("sources" if len(set(numbers)) < len(numbers) else None)
+    if spoiled is not None:
+        raise ValueError(f"{spoiled} cannot be so")
+    return record
+
+
+def _out_of_range(record: Record) -> str | None:
+    """What is a number, but none with which a session can be run."""
+    options = record.options
+    instants = {"started_at": record.started_at, "watermark": record.watermark, "begins_at": options.begins_at}
+    for name, instant in instants.items():
+        if instant is not None and not 0 <= instant < _YEAR_2200:
+            return name
+    if abs(record.epoch_offset_s or 0) * 10**9 > _YEAR_2200:
+        return "epoch_offset_s"
+    lengths = {one.name: getattr(options, one.name) for one in fields(options)}
+    lengths |= {"horizons_s": max(options.horizons_s, default=1.0), "soonest": min(options.horizons_s, default=1.0)}
+    for name, length in lengths.items():
+        if isinstance(length, float | int) and name != "begins_at" and not _LEAST <= length <= _LARGEST:
+            return name
+    return None
 
 
 def _input_file(row: dict[str, Any]) -> InputFile:

@@ -28,7 +28,7 @@ class SessionInput:
         self.sources = (self.source,)
 
     def arrivals(self) -> Iterator[Arrival]:
-        """Every arrival. Raises FileError when the file is gone."""
+        """Every arrival. Raises FileError when the file is gone, or is none of its source's kind."""
         try:
             with self.path.open("rb") as file:
                 if self.source.kind == "mavlink":
@@ -43,3 +43,5 @@ class SessionInput:
                         yield Arrival(captured.received_at, self.source.number, captured.data, captured.sender)
         except OSError as error:
             raise FileError(f"{self.path} cannot be read ({(error.strerror or str(error)).lower()}).") from error
+        except ValueError as error:
+            raise FileError(f"{self.path} is not what {self.source.name} can have sent ({error}).") from error

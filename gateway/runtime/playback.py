@@ -159,7 +159,11 @@ def _of_session(folder: Path) -> Playback:
 
 def _input(folder: Path, described: InputFile) -> SessionInput:
     path = folder / described.file
-    if not path.is_file():
+    try:
+        is_there = path.is_file()
+    except OSError:  # no name that a file can have
+        is_there = False
+    if not is_there:
         raise FileError(f"{path} is missing: the session cannot be replayed without it.")
     return SessionInput(path, described.source)
 

@@ -162,6 +162,8 @@ def parse_site(text: str, name: str = "site file") -> Site:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SiteError(f"{name}: not TOML: {error}.") from error
+    except (ValueError, RecursionError) as error:  # thousands of digits, or of brackets
+        raise SiteError(f"{name}: not TOML that anybody would write: {error}.") from error
     for key in document:
         if key != "name" and key not in _TABLES:
             raise SiteError(
