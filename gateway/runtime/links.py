@@ -20,7 +20,7 @@ from gateway.runtime.urls import LinkError, Url, bracketed
 
 RECEIVE_BUFFER_BYTES = 4 << 20
 _LARGE_BUFFER = 1 << 20  # some 2 700 small datagrams; the system's own choice holds a tenth of it
-_LONG_S, _SHORT_S = 0.01, 0.003
+_LONG_S, _SHORT_S = 0.01, 0.002
 _LARGEST_DATAGRAM = 65_535
 _DATAGRAMS_A_TURN = 2048  # then the other links have theirs
 _LINUX = sys.platform == "linux"
