@@ -9,6 +9,7 @@ Counters of a MAVLink source, by reason:
     lost, duplicate, reordered, unsequenced                  by the sequence numbers of each (system, component)
     bad time, clock unsure, reboots                          times that are none, or of which boot is not known yet
     undecided, heard twice                                   over several links: not known yet whose, and told before
+    too many components                                      more than 2048 senders: new ones are not heard
     signed, unchecked; unsigned, wrong signature, ...        without a key, and refused with one
     no fix, position out of range, repeated, ...             messages that say nothing
 
@@ -17,16 +18,18 @@ What links lose (kernel drops, resynced bytes) is counted with the links.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import repeat
 from typing import Protocol
 
 from adapters import Arrival, Source, told
 from adapters.clock import LIMIT_NS
 from adapters.epoch import SessionEpoch
+from adapters.frame_batches import MANY, NO_HEAD, Head, take
 from adapters.listening import Listened
 from adapters.mavlink import MavlinkObserver
-from adapters.mavlink_frames import parse
+from adapters.mavlink_frames import Frame, parse
 from adapters.meters import SECOND, SpeedMeter
 from adapters.radar import LandingRadarReceiver, Taken, observations
 from adapters.signing import advice
@@ -101,10 +104,16 @@ class Decoder:
         """The session's time of a stamp, ns since 1970 UTC."""
         return self._epoch.session_time(received_at)
 
-    def hear(self, arrival: Arrival) -> Heard | None:
+    def taken(self, arrivals: Sequence[Arrival]) -> Iterable[Frame | Head]:
+        """For each of many arrivals what `hear` is spared to find out; NO_HEAD where they are few, or it must look itself."""
+        if len(arrivals) < MANY or self._signing is not None:
+            return repeat(NO_HEAD, len(arrivals))
+        return take([data for _, _, data, _ in arrivals], self._wanted)
+
+    def hear(self, arrival: Arrival, taken: Frame | Head = NO_HEAD) -> Heard | None:
         """One MAVLink frame, radar datagram or told line; None where it observed nothing and there is nothing to say.
 
-        Raises KeyError for a source that was not added, and nothing else.
+        `taken`: of `taken`, where it told something. Raises KeyError for a source that was not added, and nothing else.
         """
         received_at, number, data, _ = arrival
         listened = self._listened[number]
@@ -114,9 +123,13 @@ class Decoder:
         if kind == "mavlink":
             if self._signing is not None and not self._believes(arrival, listened):
                 return self._only_notes(received_at)
-            if listened.passes(data, self._wanted, received_at):
-                return self._only_notes(received_at) if self._notes else None
-            found = self._hear_mavlink(arrival, listened)
+            if isinstance(taken, int):
+                if listened.passes(data, taken, self._wanted, received_at):
+                    return self._only_notes(received_at) if self._notes else None
+                frame = parse(data)
+            else:
+                frame = taken
+            found = self._hear_mavlink(arrival, frame, listened)
         else:
             found = self._hear_radar(arrival, listened) if kind == "radar" else self._hear_told(arrival, listened)
         if not found and not self._notes:
@@ -177,8 +190,7 @@ class Decoder:
             self._notes.append(("warning", advice(reason, listened.source.origin)))
         return False
 
-    def _hear_mavlink(self, arrival: Arrival, listened: Listened) -> Observations:
-        frame = parse(arrival.data)
+    def _hear_mavlink(self, arrival: Arrival, frame: Frame | None, listened: Listened) -> Observations:
         if frame is None:
             listened.counters["not a frame"] += 1
             return ()
@@ -192,8 +204,10 @@ class Decoder:
         if frame.signed and self._signing is None:
             listened.counters["signed, unchecked"] += 1
         found = self._mavlink.hear(arrival.source, frame, arrival.received_at, listened.counters)
-        if frame.system and (place := frame.system << 8 | frame.component) not in listened.components:
-            listened.components[place] = self._mavlink.registry.component(arrival.source, frame.system, frame.component)
+        if (place := frame.component << 8 | frame.system) not in listened.components:
+            component = self._mavlink.registry.components.get((arrival.source, frame.system, frame.component))
+            if component is not None:
+                listened.components[place] = component
         return self._with_plans(found, arrival.received_at) if self._plans or self._unclaimed else found
 
     def _hear_told(self, arrival: Arrival, listened: Listened) -> Observations:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from fastcrc.crc16 import mcrf4xx
 
 from adapters import Source
+from adapters.frame_batches import NO_HEAD, Head
 from adapters.mavlink_frames import CRC_WORDS, V2, definitions
 from adapters.meters import SECOND
 from adapters.vehicles import Component
@@ -25,7 +26,7 @@ _EXTRA = {number: message.crc_extra for number, message in definitions().items()
 
 @dataclass(slots=True)
 class Listened:
-    """One source. `components`: those heard, by 256 x system + component."""
+    """One source. `components`: those heard, by 256 x component + system."""
 
     source: Source
     counters: Counter[str] = field(default_factory=Counter)
@@ -35,20 +36,29 @@ class Listened:
     last_heard: int | None = None
     lately: deque[list[int]] = field(default_factory=lambda: deque(maxlen=_RATE_S + 1))  # [second, observations]
 
-    def passes(self, frame: bytes, wanted: frozenset[int], received_at: int) -> bool:
-        """Whether this was a good, unsigned MAVLink 2 frame of a known component that nobody wants: then it is counted."""
-        if len(frame) < 12:
-            return False
-        magic, length, flags, sequence, system, number, low, high = _HEADER(frame)
-        message = low | high << 16
-        if magic != V2 or flags or message in wanted or len(frame) != length + 12:
-            return False
-        component, extra = self.components.get(system << 8 | number), _EXTRA.get(message)
-        if component is None or extra is None:
-            return False
-        crc = mcrf4xx(frame[1:-2])
-        if CRC_WORDS[crc & 255 ^ extra] ^ crc >> 8 != frame[-2] | frame[-1] << 8:
-            return False
+    def passes(self, frame: bytes, head: Head, wanted: frozenset[int], received_at: int) -> bool:
+        """Whether this was a good, unsigned MAVLink 2 frame of a known component that nobody wants: then it is counted.
+
+        With a `head` it is known to be good, and that nobody wants it.
+        """
+        if head != NO_HEAD:
+            message, sequence = head >> 24, head & 255
+            component = self.components.get(head >> 8 & 0xFFFF)
+            if component is None:
+                return False
+        else:
+            if len(frame) < 12:
+                return False
+            magic, length, flags, sequence, system, number, low, high = _HEADER(frame)
+            message = low | high << 16
+            if magic != V2 or flags or message in wanted or len(frame) != length + 12:
+                return False
+            component, extra = self.components.get(number << 8 | system), _EXTRA.get(message)
+            if component is None or extra is None:
+                return False
+            crc = mcrf4xx(frame[1:-2])
+            if CRC_WORDS[crc & 255 ^ extra] ^ crc >> 8 != frame[-2] | frame[-1] << 8:
+                return False
         self.counters["frames"] += 1
         self.known_good.add(message)
         component.sequence.hear(sequence, message, self.counters)

@@ -13,6 +13,7 @@ is taken as a frame where some extra byte fits and where the stream goes on with
 
 from __future__ import annotations
 
+import re
 import struct
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -20,7 +21,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from operator import itemgetter
 from types import MappingProxyType, SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import all as dialect
@@ -33,6 +34,8 @@ LONGEST = 280 + 13
 
 _MESSAGES: dict[int, Any] = dialect.mavlink_map
 _EXTRA: dict[int, int] = {number: message.crc_extra for number, message in _MESSAGES.items()}
+WHOLE_SIZES: dict[int, int] = {number: message.unpacker.size for number, message in _MESSAGES.items()}
+ZEROS = tuple(bytes(number) for number in range(256))
 _NUMBERS: dict[str, int] = {message.msgname: number for number, message in _MESSAGES.items()}
 
 
@@ -52,7 +55,7 @@ _BYTE_OF_WORD = {word: byte for byte, word in enumerate(CRC_WORDS)}
 
 
 class Frame(NamedTuple):
-    """One frame taken apart. Only one whose verdict is "good" may be decoded.
+    """One frame taken apart. Only one whose verdict is "good" may be decoded. The payload is `padded`.
 
     Other verdicts: "unknown id" and "definition differs" (some CRC extra fits, but not ours), "bad checksum" (none does).
     """
@@ -103,12 +106,19 @@ def parse(frame: bytes) -> Frame | None:
     else:
         verdict = "bad checksum"
     # in the order of Frame, whose own constructor takes twice as long
-    return _FRAME((version, system, component, sequence, message, frame[start:end], flags == _SIGNED, verdict))
+    payload = padded(frame[start:end], message)
+    return new_frame((version, system, component, sequence, message, payload, flags == _SIGNED, verdict))
+
+
+def padded(payload: bytes, message: int) -> bytes:
+    """A payload with the zeros that MAVLink 2 has cut from its end, and those of the extensions that version 1 lacks."""
+    missing = WHOLE_SIZES.get(message, 0) - len(payload)
+    return payload + ZEROS[missing] if missing > 0 else payload
 
 
 _V2_HEADER = struct.Struct("<xBBxBBBHB").unpack_from
 _V1_HEADER = struct.Struct("<xBBBBB").unpack_from
-_FRAME: Callable[[Any], Frame] = partial(tuple.__new__, Frame)
+new_frame: Callable[[Any], Frame] = partial(tuple.__new__, Frame)
 
 
 @dataclass(slots=True)
@@ -203,28 +213,27 @@ class FrameScanner:
 
 
 def fields(name: str, *wanted: str) -> tuple[int, Callable[[bytes], tuple[Any, ...]]]:
-    """The id of a message and a function from its payload to the wanted fields (at least two), in that order.
+    """The id of a message and a function from its whole (`padded`) payload to the wanted fields (at least two), in that order.
 
-    Fields are numbers, texts are bytes; of an array one element each: "covariance[7]".
+    Fields are numbers, texts are bytes; of an array one element each: "covariance[7]". In the order of the wire is fastest.
     """
     message = _MESSAGES[_NUMBERS[name]]
     kinds = dict(zip(message.fieldnames, message.fieldtypes, strict=True))
-    place, places = 0, {}
-    for field_name, repeats in zip(message.ordered_fieldnames, message.array_lengths, strict=True):
-        places[field_name] = place
-        number = 1 if kinds[field_name] == "char" else max(repeats, 1)  # a text is one value, an array many
-        places |= {f"{field_name}[{index}]": place + index for index in range(number)}
-        place += number
-    unpack, size = message.unpacker.unpack, message.unpacker.size
-    pick = itemgetter(*(places[one] for one in wanted))
-
-    def read(payload: bytes) -> tuple[Any, ...]:
-        if len(payload) != size:
-            payload = payload[:size].ljust(size, b"\0")
-        picked: tuple[Any, ...] = pick(unpack(payload))
-        return picked
-
-    return int(message.id), read
+    formats, order = ["<"], list[str]()
+    parts = re.findall(r"\d*[a-zA-Z]", message.unpacker.format)  # one a field
+    for field_name, repeats, part in zip(message.ordered_fieldnames, message.array_lengths, parts, strict=True):
+        is_array = repeats > 0 and kinds[field_name] != "char"  # a text is one value, an array many
+        for index in range(repeats if is_array else 1):
+            told = f"{field_name}[{index}]" if is_array and f"{field_name}[{index}]" in wanted else field_name
+            code = part[-1] if is_array else part
+            is_wanted = told in wanted and (index == 0 or told != field_name)
+            formats.append(code if is_wanted else f"{struct.calcsize('<' + code)}x")
+            order += [told] if is_wanted else []
+    unpack: Callable[[bytes], tuple[Any, ...]] = struct.Struct("".join(formats)).unpack_from
+    if order == list(wanted):
+        return int(message.id), unpack
+    pick = itemgetter(*(order.index(one) for one in wanted))
+    return int(message.id), lambda payload: cast("tuple[Any, ...]", pick(unpack(payload)))
 
 
 def definitions() -> Mapping[int, Any]:

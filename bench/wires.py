@@ -9,13 +9,15 @@ enough that zeros are cut as they are in real streams. What is measured, always 
                     (parse_buffer, and larger pieces, take longer: its buffer is cut again for every frame)
     mavlogfile      mavutil.mavlink_connection(file).recv_msg() to the end
     columns         adapters.columns.read_columns(file)
-    live            datagrams of one frame each, TURN of them at a time, as a receiving thread hands them over: frames found,
-                    checksums checked, fields unpacked; all of all messages, or those fields that the gateway reads
-    one by one      the same with FrameScanner.feed_datagram, parse and `fields`
+    live            datagrams of one frame each, TURN of them at a time, as a receiving thread hands them over: frames found and
+                    checksums checked by `take`, fields unpacked by `fields`, as intake and decoder do where much comes in;
+                    all fields of all messages, or those that the gateway reads
+    one by one      the same with FrameScanner.feed_datagram, parse and `fields`, as they do where little comes in
 """
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import random
@@ -144,25 +146,33 @@ def _by_mavlogfile(path: Path) -> int:
     return count
 
 
-def _in_turns(frames: Sequence[bytes], wanted: dict[str, tuple[str, ...]] | None) -> int:
-    from adapters.frame_batches import FieldReaders, take_datagrams
+def _readers(wanted: dict[str, tuple[str, ...]] | None) -> dict[int, Callable[[bytes], tuple[Any, ...]]]:
+    from pymavlink.dialects.v20 import all as dialect
 
-    readers, count = FieldReaders(wanted), 0
+    from adapters.mavlink_frames import fields
+
+    chosen = wanted or {one.msgname: tuple(one.ordered_fieldnames) for one in dialect.mavlink_map.values()}
+    return dict(fields(name, *some) for name, some in chosen.items())
+
+
+def _in_turns(frames: Sequence[bytes], wanted: dict[str, tuple[str, ...]] | None) -> int:
+    from adapters.frame_batches import NO_HEAD, take
+
+    readers, count = _readers(wanted), 0
     for at in range(0, len(frames), TURN):
-        batch = take_datagrams(frames[at : at + TURN])
-        readers.read(batch)
-        count += int(batch.is_good.sum())
+        for one in take(frames[at : at + TURN], readers):
+            if not isinstance(one, int):
+                count += 1
+                readers[one.message](one.payload)
+            elif one != NO_HEAD:
+                count += 1
     return count
 
 
 def _one_by_one(frames: Sequence[bytes], wanted: dict[str, tuple[str, ...]] | None) -> int:
-    from pymavlink.dialects.v20 import all as dialect
+    from adapters.mavlink_frames import FrameScanner, parse
 
-    from adapters.mavlink_frames import FrameScanner, fields, parse
-
-    chosen = wanted or {one.msgname: tuple(one.fieldnames) for one in dialect.mavlink_map.values()}
-    readers = dict(fields(name, *some) for name, some in chosen.items() if len(some) > 1)
-    scanner, count = FrameScanner(), 0
+    readers, scanner, count = _readers(wanted), FrameScanner(), 0
     for datagram in frames:
         for frame in scanner.feed_datagram(datagram):
             taken = parse(frame)
@@ -177,6 +187,7 @@ def _one_by_one(frames: Sequence[bytes], wanted: dict[str, tuple[str, ...]] | No
 def main() -> None:
     """Measure in this process, turn by turn, each way once a turn."""
     os.environ["MAVLINK20"] = "1"
+    gc.set_threshold(20_000, 10, 10)  # as `talkdown` runs; to pymavlink's good too
     from adapters.columns import read_columns
     from adapters.tlog import TlogReader
 

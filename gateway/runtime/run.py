@@ -144,7 +144,7 @@ class Run:
         if self._first_at is None and arrivals:
             self._first_at = arrivals[0].received_at
         heard: list[Heard] = []
-        for arrival in arrivals:
+        for arrival, taken in zip(arrivals, self._decoder.taken(arrivals), strict=True):
             if self._opening is not None and arrival.received_at >= self._opening.begins_at:
                 heard = self._open(heard, self._opening)
             counted[arrival.source] += 1
@@ -152,7 +152,7 @@ class Run:
                 if recorder is not None:
                     recorder.refuse(arrival)
                 continue
-            decoded = hear(arrival)
+            decoded = hear(arrival, taken)
             if recorder is not None:
                 if self._decoder.refused is None:
                     recorder.keep(arrival)

@@ -11,8 +11,8 @@ from pymavlink.dialects.v20 import all as dialect
 from pymavlink.generator.mavcrc import x25crc
 
 from adapters.columns import read_columns
-from adapters.frame_batches import FieldReaders, take_datagrams
-from adapters.mavlink_frames import FrameScanner, fields, parse
+from adapters.frame_batches import NO_HEAD, heads, take
+from adapters.mavlink_frames import FrameScanner, fields, padded, parse
 from adapters.tlog import TlogReader
 
 T0 = 1_790_000_000_000_000  # microseconds
@@ -83,50 +83,33 @@ def test_columns_hold_what_pymavlink_reads(version: int, kind: str) -> None:
 
 @streams
 def test_readers_and_batches_read_what_pymavlink_reads(version: int, kind: str) -> None:
+    """One by one and many at once give the same frames; a batch leaves alone what is signed or of version 1."""
     frames = _frames(version, kind)
-    batch, readers = take_datagrams(frames), FieldReaders()
-    places, values = readers.read(batch)
-    assert places == list(range(len(frames)))
-    assert set(zip(batch.system.tolist(), batch.component.tolist(), batch.sequence.tolist(), strict=True)) == {
-        (3, 4, 7)
-    }
-    for frame, message, told in zip(frames, _reference(frames), values, strict=True):
-        flat = [one for name in message.ordered_fieldnames for one in _elements(_told(message, name))]
-        assert repr([one.rstrip(b"\0") if isinstance(one, bytes) else one for one in told]) == repr(flat)
-        assert len(readers.names[message.get_msgId()]) == len(flat)
+    plain = version == 2 and kind != "signed"
+    together = take(frames, MESSAGES)
+    for frame, message, taken_together in zip(frames, _reference(frames), together, strict=True):
         taken, numbers = parse(frame), _numbers(message)
         assert taken is not None
-        assert (taken.message, taken.verdict, taken.version, taken.signed) == (
-            message.get_msgId(),
-            "good",
-            version,
-            kind == "signed",
-        )
-        if len(numbers) > 1:
+        assert taken[:5] == (version, 3, 4, 7, message.get_msgId())
+        assert (taken.verdict, taken.signed) == ("good", kind == "signed")
+        assert taken_together == (taken if plain else NO_HEAD)
+        if numbers:
             number, read = fields(message.get_type(), *numbers)
             assert number == message.get_msgId()
             assert repr(read(taken.payload)) == repr(tuple(getattr(message, name) for name in numbers))
 
 
-def _elements(value: Any) -> list[Any]:
-    return value if isinstance(value, list) else [value]
+def test_fields_come_in_the_order_in_which_they_are_asked_for() -> None:
+    by_id = {message.get_msgId(): message for message in _reference(_frames(2, "whole"))}
+    payloads = {frame[7]: frame[10:-2] for frame in _frames(2, "whole") if not any(frame[8:10])}
+    for wanted in (("lat", "hdg"), ("hdg", "lat"), ("hdg",)):
+        number, read = fields("GLOBAL_POSITION_INT", *wanted)
+        assert read(padded(payloads[number], number)) == tuple(getattr(by_id[number], name) for name in wanted)
 
 
 def _numbers(message: Any) -> list[str]:
     """The fields that are single numbers."""
     return [name for name in message.get_fieldnames() if isinstance(getattr(message, name), int | float)]
-
-
-def test_wanted_fields_alone_are_read_in_the_order_of_the_wire() -> None:
-    frames = _frames(2, "whole")
-    readers = FieldReaders({"GLOBAL_POSITION_INT": ["lat", "hdg"], "HEARTBEAT": ["type", "custom_mode"]})
-    _, values = readers.read(take_datagrams(frames))
-    by_id = {message.get_msgId(): message for message in _reference(frames)}
-    heartbeat, position = by_id[0], by_id[33]
-    assert (readers.names[0], readers.names[33]) == (("custom_mode", "type"), ("lat", "hdg"))
-    assert values == [(heartbeat.custom_mode, heartbeat.type), (position.lat, position.hdg)]
-    with pytest.raises(KeyError, match="no field altitude"):
-        FieldReaders({"GLOBAL_POSITION_INT": ["altitude"]})
 
 
 def test_a_batch_takes_a_datagram_only_where_it_is_one_good_frame() -> None:
@@ -142,7 +125,8 @@ def test_a_batch_takes_a_datagram_only_where_it_is_one_good_frame() -> None:
         good,
     ]
     mixed += [good[:2] + b"\2" + good[3:], good[:7] + b"\xff\xff\xff" + good[10:], _frames(1, "whole")[0]]
-    assert take_datagrams(mixed).is_good.tolist() == [one in (good, mixed[-1]) for one in mixed]
+    assert [head != NO_HEAD for head in heads(mixed)] == [one == good for one in mixed]
+    assert [one == parse(good) for one in take(mixed, [good[7]])] == [one == good for one in mixed]
 
 
 def _many(count: int) -> list[bytes]:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from adapters.epoch import SessionEpoch
 from adapters.mavlink import MavlinkObserver
-from adapters.mavlink_frames import Frame, definitions, encode, message_name, parse
+from adapters.mavlink_frames import Frame, definitions, encode, message_name, padded, parse
 from gateway.observation import GpsReport, Observation
 
 SECOND = 10**9
@@ -28,7 +28,7 @@ def _frame(message: int, payload: bytes, sequence: int = 0) -> Frame:
     assert heartbeat is not None
     if message == 0 and not payload:
         return heartbeat
-    return heartbeat._replace(message=message, payload=payload, sequence=sequence)
+    return heartbeat._replace(message=message, payload=padded(payload, message), sequence=sequence)
 
 
 def _numbers(observation: Observation) -> list[float]:
