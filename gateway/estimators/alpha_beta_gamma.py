@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators.axis_covariance import PLACES, Terms, carried, reduced, settled, with_velocity
-from gateway.estimators.steady_gains import LEAST_RATIO, gains, gamma_for, memory
+from gateway.estimators.steady_gains import LEAST_RATIO, gains, gains_of, gamma_for, lost_memory, memory
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -40,7 +40,7 @@ class Tuning:
     """What the filter assumes; the defaults serve drones and jets, since density and p follow the target."""
 
     q: float | None = None  # of a calm target, fixed; None = from the table
-    density: float = 1.0  # m2/s5 at the start: growth of the acceleration's variance a second
+    density: float = 0.1  # m2/s5 at the start: growth of the acceleration's variance a second
     learning: float = 0.02  # of the logarithm of the density, for each unit of surprise; 0 = never
     least_p: float = 0.3  # without a floor a target without noise would freeze the filter
     greatest_p: float = 30.0
@@ -176,12 +176,16 @@ def update(
         prior = _now(state, density)
         cross = np.array(prior[:3]) if share is None else share * np.array(prior[:3])
         s = noise + (cross[0] if share is None else share * cross[0])
-        gain = _followed(gains(gamma, interval), share, cross / s, velocity)
+        # In part measured, an axis's best gain would exceed 1 on what other axes are told too: together they swing.
+        own = cross / s if share is None else np.array(prior[:3]) / (prior[0] + noise)
+        gain = _followed(gains(gamma, interval), share, own, velocity)
         expected = s
     else:
-        gain = gains(gamma, interval)
-        s, expected = noise / (1.0 - gain[0]), noise / np.square(memory(q))
+        lost, lost_in_calm = lost_memory(gamma), lost_memory(q)
+        gain = gains_of(lost, gamma, interval)
         gain = gain if share is None else share * gain
+        most = np.maximum(lost, lost_in_calm)  # a p below 1 makes nothing surer
+        s, expected = noise / np.square(1.0 - most), noise / np.square(1.0 - lost_in_calm)
     squared = y * y
     learnt = measured if share is None else measured & (share == 1.0)
     surprises, p, density = _lessons(state, density, squared / expected, learnt, tuning)
@@ -190,7 +194,7 @@ def update(
         pull = tuning.robust / np.sqrt(np.maximum(squared / s, tuning.robust**2))
         gain, s = gain * pull, s / (pull * pull)
         told = replace(told, outlying=(pull < 1.0).any(axis=-1))
-    terms = reduced(prior, cross, s, gain) if tuning.follows_covariance else settled(gamma, interval, noise)
+    terms = reduced(prior, cross, s, gain) if tuning.follows_covariance else settled(most, interval, noise)
     mean = np.array((state.position, state.velocity, state.acceleration))
     after = mean + gain * y
     touched = measured

@@ -8,8 +8,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.estimators.steady_gains import lost_memory
-
 Floats = NDArray[np.float64]
 Terms = tuple[Floats, Floats, Floats, Floats, Floats, Floats]
 
@@ -51,15 +49,15 @@ def reduced(prior: Terms, cross: Floats, s: Floats, gain: Floats) -> Floats:
     return terms
 
 
-def settled(gamma: Floats, interval_s: Floats, noise: Floats) -> Floats:
-    """The terms (6, ...) just after an update in the steady state that the gains belong to; `noise`: its variance, m2."""
-    u = lost_memory(gamma)
-    alpha, beta = u * (2.0 - u), 2.0 * u * u
+def settled(lost: Floats, interval_s: Floats, noise: Floats) -> Floats:
+    """The terms (6, ...) just after an update in the steady state of `lost` = 1 - r; `noise`: the position's variance, m2."""
+    alpha, beta = lost * (2.0 - lost), 2.0 * lost * lost
+    gamma = beta * beta / alpha
     remaining, surplus = 1.0 - alpha, 2.0 * beta - gamma
     by_t = 1.0 / interval_s
     speed = noise * by_t
     turning = speed * by_t
-    terms = np.empty((len(_TERMS), *gamma.shape))
+    terms = np.empty((len(_TERMS), *lost.shape))
     terms[0] = noise * alpha
     terms[1] = speed * beta
     terms[2] = (0.5 * gamma) * turning

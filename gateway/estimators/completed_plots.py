@@ -22,7 +22,7 @@ def completed(
     Source: 002-1, use in the gateway.
     """
     expected_xyz = frame.from_enu(predicted)
-    measured = ~np.isnan(polar)
+    measured: NDArray[np.bool_] = ~np.isnan(polar)
     whole = np.where(measured, polar, polar_from_xyz(expected_xyz))
     xyz = xyz_from_polar(whole)
     outwards = frame.enu_from_radar @ np.linalg.inv(polar_jacobian(xyz))  # ENU metres for each unit of a component
@@ -35,6 +35,6 @@ def completed(
     across = seen * (1.0 - np.eye(3))
     noise = noise + (across * across * variance[:, None, :]).sum(axis=2)
     share = np.clip(np.diagonal(seen, axis1=1, axis2=2), 0.0, 1.0)
-    share = np.where(measured.all(axis=1)[:, None], 1.0, np.where(share > 1e-6, share, 0.0))
-    position = np.where(measured.any(axis=1)[:, None], frame.to_enu(xyz), np.nan)
+    share = np.where(measured.all(axis=1, keepdims=True), 1.0, np.where(share > 1e-6, share, 0.0))
+    position = np.where(measured.any(axis=1, keepdims=True), frame.to_enu(xyz), np.nan)
     return position, np.sqrt(noise), share
