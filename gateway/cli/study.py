@@ -51,7 +51,7 @@ def study(
     if name not in STUDIES:
         raise UsageError(f"There is no study {name!r}; there are: {', '.join(STUDIES)}.")
 
-    module = importlib.import_module(f"sim.studies.{name}")
+    module = importlib.import_module(f"sim.studies.{name.replace('-', '_')}")
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=quiet or not console.is_terminal) as progress:
         task = progress.add_task(name, total=1.0)
