@@ -134,9 +134,11 @@ class Likeness:
         return self._far >= _POSITIONS and self._last[0] - self._far_since >= _SPLIT_MS
 
     def verdict(self, received_at: int) -> bool | None:
-        """True: one vehicle. False: two. None: it cannot be told yet."""
+        """True: one vehicle. False: two. None: it cannot be told yet. Who never tells of its motion is taken for the other."""
         waited = received_at - max(self.one.since, self.other.since)
-        if waited < _SHORTEST_NS or self.one.least is None or self.other.least is None:
+        if self.one.least is None or self.other.least is None:
+            return True if waited >= _PATIENCE_NS else None
+        if waited < _SHORTEST_NS:
             return None
         apart_m = median(self.apart_m) if len(self.apart_m) >= _POSITIONS else math.nan
         apart_rad = median(self.apart_rad) if len(self.apart_rad) >= _ATTITUDES else math.nan

@@ -199,9 +199,9 @@ class Registry:
         if frame.message == ATTITUDE or frame.payload[4:12].strip(b"\0"):  # positions of all zeros two would send alike
             member.recent.append((frame.message, frame.payload))
         vehicle = member.vehicle
-        for likeness in member.likenesses.values():
+        for source, likeness in member.likenesses.items():
             likeness.compare()
-            if vehicle is not None and likeness.have_parted():
+            if vehicle is not None and source in vehicle.sources and likeness.have_parted():
                 self._part(member, vehicle, counters)
                 return
 

@@ -266,3 +266,42 @@ def test_asking_for_health_changes_nothing_that_is_heard() -> None:
         one = asked.feed(arrival)
         asked.health(arrival.received_at + 7 * SECOND)
         assert quiet.feed(arrival) == one
+
+
+def _beats(source: int, seconds: float) -> list[Arrival]:
+    """What a link brings of a vehicle that says only that it is there, 0.3 s behind the others."""
+    encoder, since = FrameEncoder(1), T0 + 100 * SECOND + 300 * MS
+    return [
+        Arrival(
+            since + number * 500 * MS,
+            source,
+            encoder.encode(
+                "HEARTBEAT", type=1, autopilot=3, base_mode=0, custom_mode=0, system_status=4, mavlink_version=3
+            ),
+        )
+        for number in range(round(seconds * 2))
+    ]
+
+
+def _hear_all(arrivals: list[Arrival], sources: int) -> tuple[list[Heard], list[str]]:
+    decoder = Decoder([Source(number, "mavlink", f"link-{number}", f"udpin:{number}") for number in range(sources)])
+    heard = [decoder.feed(arrival) for arrival in sorted(arrivals)]
+    return heard, [text for one in heard for _, text in one.notes]
+
+
+def test_two_that_part_while_it_is_open_who_a_third_is_part_once() -> None:
+    """Found by fuzzing: with each further frame they parted again, and made one more vehicle of the same number."""
+    links = [Link(Airframe(takes_off_s=102.0)), Link(Airframe(takes_off_s=1e6), phase_ms=73)]
+    arrivals = [one for number, link in enumerate(links) for one in link.arrivals(number, 20)]
+    heard, notes = _hear_all(arrivals + _beats(2, 20), 3)
+    assert aircraft(heard, 15.0) == {"mavlink:1", "mavlink:1@2"}
+    assert sum("is elsewhere" in note for note in notes) == 1
+
+
+def test_a_link_that_brings_only_heartbeats_keeps_no_other_from_being_used() -> None:
+    """Nothing that it says could tell whether they are one; after 10 s they are."""
+    beats = [one._replace(received_at=one.received_at - 400 * MS) for one in _beats(0, 20)]
+    heard, notes = _hear_all(beats + Link(Airframe()).arrivals(1, 20), 2)
+    assert aircraft(heard, 11.0) == {"mavlink:1"}
+    assert len([one for one in reports(heard) if one.received_at > T0 + 111 * SECOND]) > 40
+    assert not [note for note in notes if "wo vehicles" in note]
