@@ -13,6 +13,7 @@ from itertools import accumulate, islice, repeat
 from operator import itemgetter
 
 from adapters import Arrival, Source
+from adapters.frame_batches import MANY, NO_HEAD, heads
 from adapters.mavlink_frames import FrameScanner
 from gateway.runtime.allowed import Allowed
 from gateway.runtime.links import Chunks
@@ -68,6 +69,7 @@ class Intake:
         self._next_number = len(self._radars)
         self._told: Source | None = None
         self._peers: list[dict[str, _Peer]] = [{} for _ in self._origins]
+        self._numbers: list[dict[str, int]] = [{} for _ in self._origins]  # of the peers that are sources
         self._strangers: dict[tuple[int, str], _Peer] = {}
         self._reached: dict[int, tuple[int, str]] = {}
 
@@ -78,6 +80,8 @@ class Intake:
     def take(self, heard: Sequence[tuple[int, Chunks]]) -> tuple[list[Source], list[Arrival]]:
         """Sources that are new, and the arrivals of one turn of all links (link number, chunks), in order of stamps."""
         sources, self._unannounced = self._unannounced, []
+        if len(heard) == 1 and (plain := self._take_plain(*heard[0])) is not None:
+            return sources, plain
         instants: list[int] = []
         numbers: list[int] = []
         contents: list[bytes] = []
@@ -111,6 +115,18 @@ class Intake:
                 names.append("")
         stamps = self._stamper.stamps(instants)
         return sources, list(map(_ARRIVAL, zip(stamps, numbers, contents, names, strict=True)))
+
+    def _take_plain(self, link: int, chunks: Chunks) -> list[Arrival] | None:
+        """The arrivals of many datagrams that are one good frame each, of peers that are sources: almost all there are
+        where thousands a second come. None where anything else is among them.
+        """
+        if len(chunks.data) < MANY or chunks.stream is not None or self._allowed.systems is not None:
+            return None
+        numbers = list(map(self._numbers[link].get, chunks.peers))
+        if None in numbers or NO_HEAD in heads(chunks.data):
+            return None
+        stamps = self._stamper.stamps(list(accumulate(self._stamper.heard(chunks.kernel_utc_ns), max)))
+        return list(map(_ARRIVAL, zip(stamps, numbers, chunks.data, repeat(""), strict=False)))  # type: ignore[arg-type]
 
     def tell(self, lines: Sequence[bytes]) -> tuple[list[Source], list[Arrival]]:
         """What people told the gateway: its source, if it is the first time, and the lines as arrivals of now."""
@@ -171,6 +187,7 @@ class Intake:
             origin = f"{origin} from {name}"
         source = Source(self._next_number, "mavlink", f"mavlink-{known + 1}", origin)
         self._reached[source.number] = (link, name)
+        self._numbers[link][name] = source.number
         self._next_number += 1
         return source
 

@@ -1,5 +1,7 @@
 """From chunks of links to stamped arrivals."""
 
+from fastcrc.crc16 import mcrf4xx
+
 from adapters.mavlink_frames import encode
 from gateway.runtime.allowed import Allowed, parse_allowed
 from gateway.runtime.intake import PEERS_AT_MOST, Intake
@@ -106,3 +108,23 @@ def test_the_way_back_to_a_source_is_its_link_and_its_peer() -> None:
     sources, _ = takes.take([(0, said("a", frame(0))), (1, said("a", frame(1)))])
     ways = {source.name: takes.way_to(source.number) for source in sources}
     assert ways == {"radar-1": None, "mavlink-1": (0, "a"), "mavlink-2": (1, "a")}
+
+
+def test_many_datagrams_at_once_give_what_each_alone_gives() -> None:
+    """Whole frames, several in one, damage, noise, an id that nobody knows: whatever else is among the many."""
+    unknown = b"\xfd\x01\0\0\x07\x01\x01\xff\xff\x7f\x2a"
+    odd = [frame(1) + frame(2), frame(3)[:-1] + b"?", b"noise", unknown + mcrf4xx(unknown[1:]).to_bytes(2, "little")]
+    for extra in ([], *([one] for one in odd)):
+        data = [*(frame(number & 255) for number in range(300)), *extra, frame(1)]
+        peers = ["a", "b"] * (len(data) // 2) + ["b"] * (len(data) % 2)
+        at_once, alone = intake(), intake()
+        for takes in (at_once, alone):
+            takes.take([(0, said("a", frame(0))), (0, said("b", frame(0)))])
+        times: list[int | None] = [NOW - 1_000_000 + 7 * number for number in range(len(data))]
+        together = at_once.take([(0, Chunks(peers, data, times, None))])
+        one_by_one = [
+            alone.take([(0, Chunks([peer], [one], [at], None))])
+            for peer, one, at in zip(peers, data, times, strict=True)
+        ]
+        assert together == ([], [arrival for _, arrivals in one_by_one for arrival in arrivals])
+        assert at_once.counters == alone.counters
