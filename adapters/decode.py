@@ -26,18 +26,22 @@ from typing import Protocol
 from adapters import Arrival, Source, told
 from adapters.clock import LIMIT_NS
 from adapters.epoch import SessionEpoch
-from adapters.frame_batches import MANY, NO_HEAD, Head, take
+from adapters.frame_batches import MANY, NO_HEAD, Head, frame_of, take, wanted
 from adapters.listening import Listened
 from adapters.mavlink import MavlinkObserver
 from adapters.mavlink_frames import Frame, parse
 from adapters.meters import SECOND, SpeedMeter
-from adapters.radar import LandingRadarReceiver, Taken, observations
+from adapters.radar import LandingRadarReceiver, observations
+from adapters.radar import Taken as TakenDatagram
 from adapters.signing import advice
 from adapters.wellbeing import vehicles_health
 from gateway.observation import FlightPlan, Heard, Observation, PlanPoint, Timing
 from gateway.picture import Health
 
 Observations = tuple[Observation, ...]
+Taken = tuple[Head, bytes | None]
+"""What a frame is, and its whole payload where the message says something."""
+_NOTHING_TAKEN: Taken = (NO_HEAD, None)
 
 
 class FrameGuard(Protocol):
@@ -74,6 +78,7 @@ class Decoder:
         self._epoch = SessionEpoch()
         self._mavlink = MavlinkObserver(self._epoch)
         self._wanted = self._mavlink.wanted
+        self._which = wanted(self._wanted)
         self._signing = signing
         self._radar = LandingRadarReceiver(dict(keys or {}), live)
         self._radar_clocks: dict[tuple[str, int], _RadarClock] = {}
@@ -104,13 +109,13 @@ class Decoder:
         """The session's time of a stamp, ns since 1970 UTC."""
         return self._epoch.session_time(received_at)
 
-    def taken(self, arrivals: Sequence[Arrival]) -> Iterable[Frame | Head]:
-        """For each of many arrivals what `hear` is spared to find out; NO_HEAD where they are few, or it must look itself."""
+    def taken(self, arrivals: Sequence[Arrival]) -> Iterable[Taken]:
+        """For each of many arrivals what `hear` is spared to find out; nothing where they are few, or it must look itself."""
         if len(arrivals) < MANY or self._signing is not None:
-            return repeat(NO_HEAD, len(arrivals))
-        return take([data for _, _, data, _ in arrivals], self._wanted)
+            return repeat(_NOTHING_TAKEN, len(arrivals))
+        return zip(*take([data for _, _, data, _ in arrivals], self._which), strict=True)
 
-    def hear(self, arrival: Arrival, taken: Frame | Head = NO_HEAD) -> Heard | None:
+    def hear(self, arrival: Arrival, taken: Taken = _NOTHING_TAKEN) -> Heard | None:
         """One MAVLink frame, radar datagram or told line; None where it observed nothing and there is nothing to say.
 
         `taken`: of `taken`, where it told something. Raises KeyError for a source that was not added, and nothing else.
@@ -123,12 +128,10 @@ class Decoder:
         if kind == "mavlink":
             if self._signing is not None and not self._believes(arrival, listened):
                 return self._only_notes(received_at)
-            if isinstance(taken, int):
-                if listened.passes(data, taken, self._wanted, received_at):
-                    return self._only_notes(received_at) if self._notes else None
-                frame = parse(data)
-            else:
-                frame = taken
+            head, payload = taken
+            if payload is None and listened.passes(data, head, self._wanted, received_at):
+                return self._only_notes(received_at) if self._notes else None
+            frame = parse(data) if payload is None else frame_of(head, payload)
             found = self._hear_mavlink(arrival, frame, listened)
         else:
             found = self._hear_radar(arrival, listened) if kind == "radar" else self._hear_told(arrival, listened)
@@ -244,14 +247,14 @@ class Decoder:
         now = self._epoch.session_time(arrival.received_at)
         self._radar.counters = listened.counters
         outcome = self._radar.hear(arrival.data, (arrival.source, arrival.peer), origin, now)
-        if not isinstance(outcome, Taken):
+        if not isinstance(outcome, TakenDatagram):
             self.refused = outcome
             return ()
         self._notes.extend(outcome.notes)
         timing = self._radar_timing(outcome, arrival.received_at)
         return observations(outcome.datagram, arrival.received_at, timing)
 
-    def _radar_timing(self, taken: Taken, received_at: int) -> Timing:
+    def _radar_timing(self, taken: TakenDatagram, received_at: int) -> Timing:
         header = taken.datagram.header
         key = ("radar", header.radar)
         clock = self._radar_clocks.setdefault(key, _RadarClock())

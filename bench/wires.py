@@ -44,7 +44,7 @@ MIX = {
 }
 # The fields of these messages that the gateway reads; of other messages in the mix it reads none.
 WANTED = {
-    "HEARTBEAT": ("type", "autopilot", "base_mode", "custom_mode"),
+    "HEARTBEAT": ("custom_mode", "type", "autopilot", "base_mode"),
     "SYSTEM_TIME": ("time_unix_usec", "time_boot_ms"),
     "GPS_RAW_INT": ("time_usec", "lat", "lon", "alt", "fix_type", "alt_ellipsoid", "h_acc", "v_acc", "vel_acc"),
     "SCALED_IMU2": ("time_boot_ms", "xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro"),
@@ -54,7 +54,7 @@ WANTED = {
     "GLOBAL_POSITION_INT": ("time_boot_ms", "lat", "lon", "alt", "vx", "vy", "vz", "hdg"),
     "VFR_HUD": ("airspeed", "groundspeed"),
     "WIND": ("direction", "speed", "speed_z"),
-    "SIM_STATE": ("lat_int", "lon_int", "lat", "lon", "alt", "vn", "ve", "vd"),
+    "SIM_STATE": ("lat", "lon", "alt", "vn", "ve", "vd", "lat_int", "lon_int"),
     "MISSION_CURRENT": ("seq", "total"),
 }
 SENDERS = ((1, 1), (2, 1), (3, 1))
@@ -155,17 +155,17 @@ def _readers(wanted: dict[str, tuple[str, ...]] | None) -> dict[int, Callable[[b
     return dict(fields(name, *some) for name, some in chosen.items())
 
 
-def _in_turns(frames: Sequence[bytes], wanted: dict[str, tuple[str, ...]] | None) -> int:
-    from adapters.frame_batches import NO_HEAD, take
+def _in_turns(frames: Sequence[bytes], chosen: dict[str, tuple[str, ...]] | None) -> int:
+    from adapters.frame_batches import NO_HEAD, take, wanted
 
-    readers, count = _readers(wanted), 0
+    readers, count = _readers(chosen), 0
+    which = wanted(readers)
     for at in range(0, len(frames), TURN):
-        for one in take(frames[at : at + TURN], readers):
-            if not isinstance(one, int):
-                count += 1
-                readers[one.message](one.payload)
-            elif one != NO_HEAD:
-                count += 1
+        heads, payloads = take(frames[at : at + TURN], which)
+        count += len(heads) - heads.count(NO_HEAD)
+        for head, payload in zip(heads, payloads, strict=True):
+            if payload is not None:
+                readers[head >> 24](payload)
     return count
 
 

@@ -13,7 +13,7 @@ from itertools import accumulate, islice, repeat
 from operator import itemgetter
 
 from adapters import Arrival, Source
-from adapters.frame_batches import MANY, NO_HEAD, heads
+from adapters.frame_batches import MANY, NO_HEAD, take, wanted
 from adapters.mavlink_frames import FrameScanner
 from gateway.runtime.allowed import Allowed
 from gateway.runtime.links import Chunks
@@ -21,6 +21,7 @@ from gateway.runtime.stamps import Stamper
 from gateway.runtime.told_plans import TOLD
 
 PEERS_AT_MOST = 128  # a session's MAVLink peers; more are counted and not heard
+_NONE_WANTED = wanted(())  # here frames are only cut
 _STRANGERS_AT_MOST = 64  # peers that have not sent a whole frame yet; the one silent for longest makes room
 
 
@@ -123,7 +124,7 @@ class Intake:
         if len(chunks.data) < MANY or chunks.stream is not None or self._allowed.systems is not None:
             return None
         numbers = list(map(self._numbers[link].get, chunks.peers))
-        if None in numbers or NO_HEAD in heads(chunks.data):
+        if None in numbers or NO_HEAD in take(chunks.data, _NONE_WANTED)[0]:
             return None
         stamps = self._stamper.stamps(list(accumulate(self._stamper.heard(chunks.kernel_utc_ns), max)))
         return list(map(_ARRIVAL, zip(stamps, numbers, chunks.data, repeat(""), strict=False)))  # type: ignore[arg-type]

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import all as dialect
 from pymavlink.generator.mavcrc import x25crc
 
 from adapters.columns import read_columns
-from adapters.frame_batches import NO_HEAD, heads, take
+from adapters.frame_batches import NO_HEAD, frame_of, take, wanted
 from adapters.mavlink_frames import FrameScanner, fields, padded, parse
 from adapters.tlog import TlogReader
 
@@ -86,13 +86,16 @@ def test_readers_and_batches_read_what_pymavlink_reads(version: int, kind: str) 
     """One by one and many at once give the same frames; a batch leaves alone what is signed or of version 1."""
     frames = _frames(version, kind)
     plain = version == 2 and kind != "signed"
-    together = take(frames, MESSAGES)
+    together = [
+        None if payload is None else frame_of(head, payload)
+        for head, payload in zip(*take(frames, wanted(MESSAGES)), strict=True)
+    ]
     for frame, message, taken_together in zip(frames, _reference(frames), together, strict=True):
         taken, numbers = parse(frame), _numbers(message)
         assert taken is not None
         assert taken[:5] == (version, 3, 4, 7, message.get_msgId())
         assert (taken.verdict, taken.signed) == ("good", kind == "signed")
-        assert taken_together == (taken if plain else NO_HEAD)
+        assert taken_together == (taken if plain else None)
         if numbers:
             number, read = fields(message.get_type(), *numbers)
             assert number == message.get_msgId()
@@ -102,9 +105,9 @@ def test_readers_and_batches_read_what_pymavlink_reads(version: int, kind: str) 
 def test_fields_come_in_the_order_in_which_they_are_asked_for() -> None:
     by_id = {message.get_msgId(): message for message in _reference(_frames(2, "whole"))}
     payloads = {frame[7]: frame[10:-2] for frame in _frames(2, "whole") if not any(frame[8:10])}
-    for wanted in (("lat", "hdg"), ("hdg", "lat"), ("hdg",)):
-        number, read = fields("GLOBAL_POSITION_INT", *wanted)
-        assert read(padded(payloads[number], number)) == tuple(getattr(by_id[number], name) for name in wanted)
+    for asked in (("lat", "hdg"), ("hdg", "lat"), ("hdg",)):
+        number, read = fields("GLOBAL_POSITION_INT", *asked)
+        assert read(padded(payloads[number], number)) == tuple(getattr(by_id[number], name) for name in asked)
 
 
 def _numbers(message: Any) -> list[str]:
@@ -125,8 +128,10 @@ def test_a_batch_takes_a_datagram_only_where_it_is_one_good_frame() -> None:
         good,
     ]
     mixed += [good[:2] + b"\2" + good[3:], good[:7] + b"\xff\xff\xff" + good[10:], _frames(1, "whole")[0]]
-    assert [head != NO_HEAD for head in heads(mixed)] == [one == good for one in mixed]
-    assert [one == parse(good) for one in take(mixed, [good[7]])] == [one == good for one in mixed]
+    heads, payloads = take(mixed, wanted([good[7]]))
+    assert [head != NO_HEAD for head in heads] == [one == good for one in mixed]
+    assert [one is not None for one in payloads] == [one == good for one in mixed]
+    assert take(mixed, wanted(())) == (heads, [None] * len(mixed))
 
 
 def _many(count: int) -> list[bytes]:
