@@ -39,7 +39,7 @@ UNKNOWN_SPEED_MPS, UNKNOWN_ACCELERATION_MPS2 = 100.0, 5.0  # sigmas of what is n
 class Tuning:
     """What the filter assumes; the defaults serve drones and jets, since density and p follow the target."""
 
-    q: float | None = None  # of a calm target, fixed; None = from the table
+    q: float | None = None  # of a calm target, fixed, for equal intervals; None = from the table
     density: float = 0.1  # m2/s5 at the start: growth of the acceleration's variance a second
     learning: float = 0.02  # of the logarithm of the density, for each unit of surprise; 0 = never
     least_p: float = 0.3  # without a floor a target without noise would freeze the filter
@@ -245,9 +245,10 @@ def _lessons(
     if tuning.q is None and tuning.learning:
         lesson = np.exp(tuning.learning * (np.minimum(surprise, GREATEST_LESSON) - 1.0))
         taught = np.minimum(np.maximum(density * lesson, LEAST_DENSITY), GREATEST_DENSITY)
-        density = taught if measured.all() else np.where(measured, taught, density)
+        density = taught
     if not measured.all():
         surprises = np.where(measured, surprises, state.surprises)
+        density = np.where(measured, density, state.density)
     p = surprises.sum(axis=0) / WINDOW
     return surprises, np.minimum(np.maximum(p, tuning.least_p), tuning.greatest_p), density
 

@@ -28,17 +28,19 @@ MOTION = (
     ("acceleration", "c  acceleration (m/s2)"),
     ("error", "d  squared error (m2)"),
 )
-NOISY = (
-    ("track", "track (m)"),
-    ("error", "error of the position (m)"),
-    ("gains", "alpha, beta, gamma"),
-    ("p", "p"),
+GAINS = (("gains", "alpha, beta, gamma"), ("p", "p"))
+SINE = (
+    ("measured", "a  measured and filtered (m)"),
+    ("true", "b  true and filtered (m)"),
+    ("error", "error (m)"),
+    *GAINS,
 )
+HARD = (("error", "error (m)"), ("small", "error, the adaptive ones alone (m)"), *GAINS)
 FIGURES = (
     ("figure_3", "Figure 3: gamma 0.5", MOTION, 200.0),
     ("figure_4", "Figure 4: q too small", MOTION, 200.0),
-    ("figure_5", "Figure 5: sine", NOISY, 400.0),
-    ("manoeuvre", "Manoeuvre", NOISY, 180.0),
+    ("figure_5", "Figure 5: sine", SINE, 400.0),
+    ("manoeuvre", "Manoeuvre", HARD, 180.0),
 )
 
 
@@ -49,11 +51,8 @@ def draw(path: Path, seed: int) -> None:
         recording.send_recording_name("002-1: the adaptive alpha-beta-gamma filter")
         for name, gamma in (("figure_3", ENOUGH), ("figure_4", TOO_SMALL)):
             _draw_motion(recording, name, noise_free(gamma))
-        _draw_noisy(recording, "figure_5", {"adaptive": sine(Tuning(), 1, seed)})
-        fixed = Tuning(q=TOO_SMALL, least_p=1.0, greatest_p=1.0, follows_covariance=False)
-        adaptive = Tuning(q=TOO_SMALL, follows_covariance=False)
-        runs = {"q 0.001, adaptive": manoeuvre(adaptive, 1, seed), "q 0.001, fixed": manoeuvre(fixed, 1, seed)}
-        _draw_noisy(recording, "manoeuvre", runs | {"default": manoeuvre(Tuning(), 1, seed)})
+        _draw_sine(recording, sine(Tuning(), 1, seed))
+        _draw_manoeuvre(recording, seed)
 
 
 def _blueprint() -> rrb.Blueprint:
@@ -70,42 +69,70 @@ def _plot(origin: str, name: str, span_s: float) -> rrb.TimeSeriesView:
 
 
 def _line(
-    recording: rr.RecordingStream, path: str, time_s: Floats, values: Floats, color: list[int], name: str
+    recording: rr.RecordingStream,
+    path: str,
+    time_s: Floats,
+    values: Floats,
+    color: list[int],
+    name: str,
+    width: float = 1.2,
 ) -> None:
-    recording.log(path, rr.SeriesLines(colors=[color], names=[name]), static=True)
+    recording.log(path, rr.SeriesLines(colors=[color], names=[name], widths=[width]), static=True)
     recording.send_columns(path, [rr.TimeColumn("time", duration=time_s)], rr.Scalars.columns(scalars=values))
 
 
 def _dots(
     recording: rr.RecordingStream, path: str, time_s: Floats, values: Floats, color: list[int], name: str
 ) -> None:
-    recording.log(path, rr.SeriesPoints(colors=[color], names=[name], marker_sizes=[2.5]), static=True)
+    recording.log(path, rr.SeriesPoints(colors=[color], names=[name], marker_sizes=[2.0]), static=True)
     recording.send_columns(path, [rr.TimeColumn("time", duration=time_s)], rr.Scalars.columns(scalars=values))
 
 
 def _draw_motion(recording: rr.RecordingStream, figure: str, run: Run) -> None:
     """Figures 3 and 4: estimate on truth, and the squared error."""
     for place, (name, _) in enumerate(MOTION[:3]):
+        _line(recording, f"/{figure}/{name}/filtered", run.time_s, run.estimate[:, 0, place], FILTERED, "filtered", 4.0)
         _line(recording, f"/{figure}/{name}/true", run.time_s, run.truth[:, place], TRUE, "true")
-        _line(recording, f"/{figure}/{name}/filtered", run.time_s, run.estimate[:, 0, place], FILTERED, "filtered")
     _line(recording, f"/{figure}/error/squared", run.time_s, np.square(run.error_m[:, 0]), FILTERED, "squared error")
 
 
-def _draw_noisy(recording: rr.RecordingStream, figure: str, runs: dict[str, Run]) -> None:
-    """Figure 5 and the manoeuvre: tracks, errors, gains of the first run, p of all."""
-    first = next(iter(runs.values()))
-    time_s = first.time_s
-    _dots(recording, f"/{figure}/track/measured", time_s, first.measured_m[:, 0], MEASURED, "measured")
-    _line(recording, f"/{figure}/track/true", time_s, first.truth[:, 0], TRUE, "true")
-    noise = first.measured_m[:, 0] - first.truth[:, 0]
-    _dots(recording, f"/{figure}/error/measured", time_s, noise, MEASURED, "measured")
-    for (name, run), color in zip(runs.items(), (FILTERED, OTHER, GREEN), strict=False):
-        key = name.replace(" ", "_").replace(",", "").replace(".", "_")
-        _line(recording, f"/{figure}/track/{key}", time_s, run.estimate[:, 0, 0], color, name)
-        _line(recording, f"/{figure}/error/{key}", time_s, run.error_m[:, 0], color, name)
-        _line(recording, f"/{figure}/p/{key}", time_s, run.p[:, 0], color, name)
-    used = gains(first.gamma[:, 0], np.ones(len(time_s)))
-    for name, values, color in zip(
-        ("alpha", "beta", "gamma"), (*used[:2], 2.0 * used[2]), (FILTERED, OTHER, GREEN), strict=True
-    ):
-        _line(recording, f"/{figure}/gains/{name}", time_s, values, color, name)
+def _draw_sine(recording: rr.RecordingStream, run: Run) -> None:
+    """Figure 5: the filtered track beside what was measured, and on the truth."""
+    filtered = run.estimate[:, 0, 0]
+    _dots(recording, "/figure_5/measured/measured", run.time_s, run.measured_m[:, 0], MEASURED, "measured")
+    _line(recording, "/figure_5/measured/filtered", run.time_s, filtered, FILTERED, "filtered")
+    _line(recording, "/figure_5/true/filtered", run.time_s, filtered, FILTERED, "filtered", 4.0)
+    _line(recording, "/figure_5/true/true", run.time_s, run.truth[:, 0], TRUE, "true")
+    _dots(recording, "/figure_5/error/measured", run.time_s, _noise(run), MEASURED, "measured")
+    _line(recording, "/figure_5/error/filtered", run.time_s, run.error_m[:, 0], FILTERED, "filtered")
+    _line(recording, "/figure_5/p/p", run.time_s, run.p[:, 0], FILTERED, "p")
+    _draw_gains(recording, "figure_5", run)
+
+
+def _draw_manoeuvre(recording: rr.RecordingStream, seed: int) -> None:
+    """Errors and p of a fixed gain, an adapted one and the defaults; the gains of the adapted one."""
+    fixed = Tuning(q=TOO_SMALL, least_p=1.0, greatest_p=1.0, follows_covariance=False)
+    adaptive = manoeuvre(Tuning(q=TOO_SMALL, follows_covariance=False), 1, seed)
+    shown = (
+        ("fixed", "q 0.001, fixed", manoeuvre(fixed, 1, seed), OTHER),
+        ("adaptive", "q 0.001, adaptive", adaptive, FILTERED),
+        ("default", "default", manoeuvre(Tuning(), 1, seed), GREEN),
+    )
+    _dots(recording, "/manoeuvre/small/measured", adaptive.time_s, _noise(adaptive), MEASURED, "measured")
+    for key, name, run, color in shown:
+        _line(recording, f"/manoeuvre/error/{key}", run.time_s, run.error_m[:, 0], color, name)
+        _line(recording, f"/manoeuvre/p/{key}", run.time_s, run.p[:, 0], color, name)
+        if key != "fixed":
+            _line(recording, f"/manoeuvre/small/{key}", run.time_s, run.error_m[:, 0], color, name)
+    _draw_gains(recording, "manoeuvre", adaptive)
+
+
+def _draw_gains(recording: rr.RecordingStream, figure: str, run: Run) -> None:
+    alpha, beta, half_gamma = gains(run.gamma[:, 0], np.ones(len(run.time_s)))
+    for name, values, color in (("alpha", alpha, FILTERED), ("beta", beta, OTHER), ("gamma", 2.0 * half_gamma, GREEN)):
+        _line(recording, f"/{figure}/gains/{name}", run.time_s, values, color, name)
+
+
+def _noise(run: Run) -> Floats:
+    """The measurements' errors (t,) of the first run."""
+    return np.asarray(run.measured_m[:, 0] - run.truth[:, 0])
