@@ -13,6 +13,7 @@ from collections import Counter
 
 from adapters.mavlink_frames import fields
 from adapters.moments import Moments, Observations
+from adapters.positions import is_altitude
 from adapters.roles import PX4
 from adapters.vehicles import Component, Vehicle
 from gateway.observation import FlightPlan, Intent
@@ -30,6 +31,8 @@ def home(
 ) -> Observations:
     """HOME_POSITION."""
     latitude, longitude, altitude_mm = _read_home(payload)
+    if not is_altitude(altitude_mm, counters):
+        return ()
     changed = vehicle.plan.hear_home(latitude / 1e7, longitude / 1e7, altitude_mm / 1000)
     if not changed:
         return ()

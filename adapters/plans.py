@@ -33,6 +33,7 @@ _KINDS |= dict.fromkeys((17, 18, 19, 31), "loiter")
 _LAST_NAVIGATION, _REGION_OF_INTEREST = 95, 80
 _MSL_FRAMES, _HOME_FRAMES, _TERRAIN_FRAMES = (0, 5), (3, 6), (10, 11)
 _ALL_TYPES = 255
+_HIGHEST_M = 100_000.0
 
 
 def plan_point(
@@ -40,13 +41,14 @@ def plan_point(
 ) -> PlanPoint | None:
     """A mission item as a point of a plan; None where it is no place that the vehicle will pass.
 
-    `command` and `frame` are MAV_CMD and MAV_FRAME; the altitude is above what the frame says, NaN where it says none.
+    `command` and `frame` are MAV_CMD and MAV_FRAME; the altitude is above what the frame says, NaN where it says none, as
+    100 km and more do.
     """
     if command > _LAST_NAVIGATION or command == _REGION_OF_INTEREST or not _is_place(latitude_deg, longitude_deg):
         return None
     if frame not in (*_MSL_FRAMES, *_HOME_FRAMES, *_TERRAIN_FRAMES):
         return None
-    altitude = altitude_m if math.isfinite(altitude_m) else None
+    altitude = altitude_m if abs(altitude_m) < _HIGHEST_M else None
     return PlanPoint(
         sequence,
         _KINDS.get(command, "other"),

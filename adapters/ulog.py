@@ -133,8 +133,9 @@ def _load(path: Path) -> Any:
         raise UlogMissing("Reading a .ulg log needs pyulog: pip install talkdown[ulog].") from error
     wanted = [name for names in _CHOICES for name in names]
     try:
-        with contextlib.redirect_stdout(io.StringIO()):  # pyulog prints what it stumbles over
-            return ULog(str(path), wanted)
+        # pyulog prints what it stumbles over, and leaves a file open that it opened
+        with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):
+            return ULog(file, wanted)
     except Exception as error:
         raise UlogDamaged(f"it is damaged ({type(error).__name__.lower()}: {error})") from error
 

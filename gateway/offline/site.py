@@ -17,7 +17,7 @@ from statistics import median
 
 from gateway.frames import RunwayFrame
 from gateway.observation import FlightPlan, GpsReport, Observation, PlanPoint, VehicleStatus
-from gateway.settings import Runway, Site
+from gateway.settings import Runway, Site, SiteError, format_site, parse_site
 
 LENGTH_M, WIDTH_M, CROSSING_HEIGHT_M = 600.0, 30.0, 5.0  # a small aircraft's field
 _STANDING_M, _STANDING_NS = 3.0, 5_000_000_000
@@ -105,9 +105,18 @@ def propose_site(observations: Iterable[Observation], *, complete: bool = False)
     for propose in (_from_landing, _from_home, _from_standing, _from_first_report):
         for aircraft in reporting:
             proposal = propose(aircraft, complete)
-            if proposal is not None:
+            if proposal is not None and _is_possible(proposal.site):
                 return proposal
     return None
+
+
+def _is_possible(site: Site) -> bool:
+    """Whether a site file could say this: not where somebody tells a home 2000 km above the sea."""
+    try:
+        parse_site(format_site(site))
+    except SiteError:
+        return False
+    return True
 
 
 def _from_landing(told: _Told, complete: bool) -> SiteProposal | None:

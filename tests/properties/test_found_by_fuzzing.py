@@ -21,9 +21,11 @@ from adapters.mavlink_frames import encode as mavlink
 from adapters.meters import SpeedMeter
 from adapters.mission_files import MissionFileError, read_mission
 from adapters.pcap import PcapWriter
+from adapters.plans import plan_point
 from adapters.radar import LandingRadarReceiver, Taken
 from gateway import pipeline
-from gateway.observation import Heard, RadarStatus
+from gateway.observation import FlightPlan, GpsReport, Heard, PlanPoint, RadarStatus
+from gateway.offline.site import propose_site
 from gateway.runtime.folder import FolderError, InputFile, Record, read_record, write_record
 from gateway.runtime.inputs import SessionInput
 from gateway.runtime.playback import open_playback
@@ -238,3 +240,32 @@ def test_the_neighbours_of_a_bad_stamp_stay_in_order(tmp_path: Path) -> None:
     stamps = [arrival.received_at for arrival in CaptureRecording(path).arrivals()]
     assert all(late > early for early, late in pairwise(stamps))
     assert stamps[-1] == T0 + SECOND
+
+
+def _home(altitude_mm: int) -> Decoder:
+    decoder = Decoder([Source(0, "mavlink", "mavlink-1", "here")])
+    values: dict[str, Any] = dict.fromkeys(("x", "y", "z", "approach_x", "approach_y", "approach_z"), 0.0)
+    values |= {"latitude": 310_000_000, "longitude": 1_040_000_000, "altitude": altitude_mm, "q": [1.0, 0.0, 0.0, 0.0]}
+    decoder.hear(Arrival(T0, 0, mavlink("HOME_POSITION", values, system=1)))
+    return decoder
+
+
+def test_a_home_in_space_is_none() -> None:
+    assert _home(2_131_290_522).counters()["mavlink-1 altitude out of range"] == 1
+    assert "mavlink-1 altitude out of range" not in _home(500_000).counters()
+
+
+@pytest.mark.parametrize(("altitude_m", "told_by"), [(500.0, "home"), (50_000.0, "heard first")])
+def test_a_place_that_no_site_file_could_say_is_not_taken(altitude_m: float, told_by: str) -> None:
+    """The next that tells of the place is: it ended every session without a site file."""
+    report = GpsReport("mavlink:1", T0, T0, 0.541, 1.8151, altitude_msl_m=510.0)
+    plan = FlightPlan("mavlink:1", T0, T0, (PlanPoint(0, "home", 0.541, 1.8151, altitude_msl_m=altitude_m),))
+    proposal = propose_site([plan, report], complete=True)
+    assert proposal is not None
+    assert told_by in proposal.origin.lower()
+
+
+def test_an_item_of_a_plan_as_high_as_no_number_should_be_has_no_altitude() -> None:
+    point = plan_point(1, 16, 3, 31.0, 104.0, 1e38)
+    assert point is not None
+    assert point.altitude_above_home_m is None
