@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -65,16 +64,6 @@ PlanOption = Annotated[
         metavar="[VEHICLE=]FILE",
         help="A mission file (.plan, QGC WPL 110), and whose it is, such as mavlink:2=circuit.plan; repeatable.",
         show_default=False,
-    ),
-]
-KeyOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--key",
-        metavar="FILE",
-        help="MAVLink 2 signing: 64 hex digits, 32 bytes or a passphrase. Frames that are not signed with it are refused.",
-        show_default=False,
-        rich_help_panel=_TRUST,
     ),
 ]
 AllowPeerOption = Annotated[
@@ -166,7 +155,7 @@ def live(
     plan: PlanOption = None,
     weighting: take.WeightingOption = take.Weighting.bias,
     association: take.AssociationOption = take.Association.default,
-    key: KeyOption = None,
+    key: take.KeyOption = None,
     allow_peer: AllowPeerOption = None,
     allow_system: AllowSystemOption = None,
     heartbeat: HeartbeatOption = False,

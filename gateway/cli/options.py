@@ -82,6 +82,15 @@ AssociationOption = Annotated[
     Association,
     typer.Option("--association", help="When a radar track and an aircraft are one: ours, or paper 003's literally."),
 ]
+KeyOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--key",
+        metavar="FILE",
+        help="MAVLink 2 signing: 64 hex digits, 32 bytes or a passphrase. Frames that are not signed with it are refused.",
+        show_default=False,
+    ),
+]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress and no summary; only failures.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the summary as one JSON object.")]
 

@@ -164,6 +164,7 @@ def replay(
     archive: take.ArchiveOption = None,
     weighting: WeightingOption = None,
     association: AssociationOption = None,
+    key: take.KeyOption = None,
     quiet: take.QuietOption = False,
     json: take.JsonOption = False,
 ) -> None:
@@ -193,6 +194,7 @@ def replay(
             archive=archive,
             serve=take.read_serve(serve, looks),
             keys=take.read_keys(place, site),
+            signing_key=take.read_signing_key(key),
             is_watched=pace is not None or looks is not take.Viewer.none,
             name="" if has_own_place else files[0].stem,
             command=tuple(sys.argv[1:]),
