@@ -14,13 +14,13 @@ Source: 002-1, sections 1 and 2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.estimators.axis_covariance import PLACES, Terms, carried, reduced, settled, with_velocity
-from gateway.estimators.steady_gains import LEAST_RATIO, gains, gains_of, gamma_for, lost_memory, memory
+from gateway.estimators.axis_covariance import PLACES, Terms, Three, carried, reduced, settled, with_velocity
+from gateway.estimators.steady_gains import LEAST_RATIO, gains_of, gamma_for, lost_memory, memory
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -172,51 +172,66 @@ def update(
         y, noise = np.where(measured, y, 0.0), np.where(measured, noise, 1.0)
     density, interval, q = _calm(state, noise, tuning)
     gamma = np.minimum(np.maximum(state.p * q, LEAST_GAMMA), GREATEST_GAMMA)
+    lost = lost_memory(gamma)
+    gain = gains_of(lost, gamma, interval)
+    if share is not None:
+        gain = (share * gain[0], share * gain[1], share * gain[2])
+    squared = y * y
     if tuning.follows_covariance:
         prior = _now(state, density)
-        cross = np.array(prior[:3]) if share is None else share * np.array(prior[:3])
-        s = noise + (cross[0] if share is None else share * cross[0])
-        # In part measured, an axis's best gain would exceed 1 on what other axes are told too: together they swing.
-        own = cross / s if share is None else np.array(prior[:3]) / (prior[0] + noise)
-        gain = _followed(gains(gamma, interval), share, own, velocity)
-        expected = s
+        cross = prior[:3] if share is None else (share * prior[0], share * prior[1], share * prior[2])
+        s = noise + (prior[0] if share is None else share * cross[0])
+        gain = _followed(gain, prior, s if share is None else prior[0] + noise, velocity)
+        gain, bounded, outlying = _bounded(gain, s, squared, tuning)
+        terms, expected = reduced(prior, cross, bounded, gain), s
     else:
-        lost, lost_in_calm = lost_memory(gamma), lost_memory(q)
-        gain = gains_of(lost, gamma, interval)
-        gain = gain if share is None else share * gain
-        most = np.maximum(lost, lost_in_calm)  # a p below 1 makes nothing surer
-        s, expected = noise / np.square(1.0 - most), noise / np.square(1.0 - lost_in_calm)
-    squared = y * y
+        calm = lost_memory(q)
+        most = np.maximum(lost, calm)  # a p below 1 makes nothing surer
+        s, expected = noise / np.square(1.0 - most), noise / np.square(1.0 - calm)
+        gain, _, outlying = _bounded(gain, s, squared, tuning)
+        terms = settled(most, np.maximum(gamma, q), interval, noise)
     learnt = measured if share is None else measured & (share == 1.0)
-    surprises, p, density = _lessons(state, density, squared / expected, learnt, tuning)
-    told = Innovation(y, s if whole else np.where(measured, s, 1.0), measured, np.zeros(len(y), dtype=np.bool_), gamma)
-    if tuning.robust is not None:
-        pull = tuning.robust / np.sqrt(np.maximum(squared / s, tuning.robust**2))
-        gain, s = gain * pull, s / (pull * pull)
-        told = replace(told, outlying=(pull < 1.0).any(axis=-1))
-    terms = reduced(prior, cross, s, gain) if tuning.follows_covariance else settled(most, interval, noise)
-    mean = np.array((state.position, state.velocity, state.acceleration))
-    after = mean + gain * y
+    surprises, p, taught = _lessons(state, density, squared / expected, learnt, tuning)
+    told = Innovation(y, s if whole else np.where(measured, s, 1.0), measured, outlying, gamma)
+    before = (state.position, state.velocity, state.acceleration)
+    after = (before[0] + gain[0] * y, before[1] + gain[1] * y, before[2] + gain[2] * y)
     touched = measured
     if velocity is not None:
         if not whole:
-            after, terms = np.where(measured, after, mean), np.where(measured, terms, _now(state, density))
+            terms = np.where(measured, terms, _now(state, density))
         after, terms, told = _sped(after, terms, velocity, velocity_sigma, told)
         touched = measured | ~np.isnan(velocity)
     since = np.zeros_like(y)
     if not touched.all():
-        after, terms = np.where(touched, after, mean), np.where(touched, terms, state.terms)
-        since = np.where(touched, since, state.since_s)
-    return Estimate(after[0], after[1], after[2], terms, since, density, surprises, p), told
+        terms, since = np.where(touched, terms, state.terms), np.where(touched, since, state.since_s)
+    return Estimate(*after, terms, since, taught, surprises, p), told
 
 
-def _followed(steady: Floats, share: Floats | None, own: Floats, velocity: Floats | None) -> Floats:
-    """The gains (3, n, axes): steady ones, or the covariance's own where it knows the position worse, or a velocity too."""
-    gain = steady if share is None else share * steady
-    follows = own[0] > gain[0]
+def _followed(steady: Three, prior: Terms, s: Floats, velocity: Floats | None) -> Three:
+    """The gains: steady ones, or the covariance's own where it knows the position worse, or where there is a velocity.
+
+    `s` of an axis measured in part is as if it were measured whole: its best gain would exceed 1 on what the other axes are
+    told too, and together they would swing.
+    """
+    own = prior[0] / s
+    follows = own > steady[0]
     if velocity is not None:
         follows |= ~np.isnan(velocity)
-    return np.where(follows, own, gain)
+    by_s = 1.0 / s
+    return (
+        np.where(follows, own, steady[0]),
+        np.where(follows, prior[1] * by_s, steady[1]),
+        np.where(follows, prior[2] * by_s, steady[2]),
+    )
+
+
+def _bounded(gain: Three, s: Floats, squared: Floats, tuning: Tuning) -> tuple[Three, Floats, Bools]:
+    """The gains and residual variances with what pulls too far held back, and which tracks (n,) that concerned."""
+    if tuning.robust is None:
+        return gain, s, np.zeros(len(s), dtype=np.bool_)
+    pull = tuning.robust / np.sqrt(np.maximum(squared / s, tuning.robust**2))
+    outlying = np.asarray((pull < 1.0).any(axis=-1))
+    return (gain[0] * pull, gain[1] * pull, gain[2] * pull), s / (pull * pull), outlying
 
 
 def _calm(state: Estimate, noise: Floats, tuning: Tuning) -> tuple[Floats, Floats, Floats]:
@@ -244,8 +259,7 @@ def _lessons(
     surprises = np.concatenate([state.surprises[1:], surprise[None]])
     if tuning.q is None and tuning.learning:
         lesson = np.exp(tuning.learning * (np.minimum(surprise, GREATEST_LESSON) - 1.0))
-        taught = np.minimum(np.maximum(density * lesson, LEAST_DENSITY), GREATEST_DENSITY)
-        density = taught
+        density = np.minimum(np.maximum(density * lesson, LEAST_DENSITY), GREATEST_DENSITY)
     if not measured.all():
         surprises = np.where(measured, surprises, state.surprises)
         density = np.where(measured, density, state.density)
@@ -254,9 +268,9 @@ def _lessons(
 
 
 def _sped(
-    mean: Floats, terms: Floats, velocity: Floats, sigma: Floats | float, told: Innovation
-) -> tuple[Floats, Floats, Innovation]:
-    """Means (3, n, axes) and terms (6, n, axes) after velocities too, with the covariance's own gains."""
+    mean: Three, terms: Floats, velocity: Floats, sigma: Floats | float, told: Innovation
+) -> tuple[Three, Floats, Innovation]:
+    """Means and terms (6, n, axes) after velocities too, with the covariance's own gains."""
     measured = ~np.isnan(velocity)
     y = np.where(measured, velocity - mean[1], 0.0)
     gain, s, less = with_velocity(terms, np.where(measured, np.square(sigma), 1.0))
@@ -267,4 +281,5 @@ def _sped(
         told.outlying,
         told.gamma,
     )
-    return mean + gain * y, np.where(measured, less, terms), both
+    after = (mean[0] + gain[0] * y, mean[1] + gain[1] * y, mean[2] + gain[2] * y)
+    return after, np.where(measured, less, terms), both

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+Three = tuple[Floats, Floats, Floats]
 Terms = tuple[Floats, Floats, Floats, Floats, Floats, Floats]
 
 PLACES = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])  # of the terms in the matrix
@@ -33,45 +34,49 @@ def carried(terms: Floats, elapsed_s: Floats, step_variance: Floats) -> Terms:
     return ss_now, with_old_speed + t * sa_now, sa_now, vv + t * (va + va_now), va_now, aa
 
 
-def reduced(prior: Terms, cross: Floats, s: Floats, gain: Floats) -> Floats:
-    """The terms (6, ...) after any gains (3, ...): those after the best gains, and what these cost for being others.
+def reduced(prior: Terms, cross: Three, s: Floats, gain: Three) -> Floats:
+    """The terms (6, ...) after any gains: those after the best gains, and what these cost for being others.
 
-    `cross` (3, ...) is the state's covariance with the residual, `s` (...) the residual's variance. Equal to Joseph's form,
-    symmetric by construction.
+    `cross` is the state's covariance with the residual, `s` (...) the residual's variance. Equal to Joseph's form, symmetric
+    by construction.
     """
     root = np.sqrt(s)
-    told = cross / root
-    off = gain * root - told
+    by_root = 1.0 / root
+    told = [each * by_root for each in cross]
+    off = [each * root - one for each, one in zip(gain, told, strict=True)]
     terms = np.empty((len(_TERMS), *s.shape))
-    for place, (i, j) in enumerate(_TERMS):  # one small array after the other: they stay in the cache
+    for place, (i, j) in enumerate(_TERMS):
         np.subtract(prior[place], told[i] * told[j], out=terms[place])
         terms[place] += off[i] * off[j]
     return terms
 
 
-def settled(lost: Floats, interval_s: Floats, noise: Floats) -> Floats:
-    """The terms (6, ...) just after an update in the steady state of `lost` = 1 - r; `noise`: the position's variance, m2."""
-    alpha, beta = lost * (2.0 - lost), 2.0 * lost * lost
-    gamma = beta * beta / alpha
-    remaining, surplus = 1.0 - alpha, 2.0 * beta - gamma
+def settled(lost: Floats, gamma: Floats, interval_s: Floats, noise: Floats) -> Floats:
+    """The terms (6, ...) just after an update in the steady state of gamma, with `lost` = 1 - r and the noise's variance m2.
+
+    The usual closed forms in alpha, beta and gamma, written in 1 - r.
+    """
+    half, by_r = 0.5 * gamma, 1.0 / (1.0 - lost)
     by_t = 1.0 / interval_s
     speed = noise * by_t
     turning = speed * by_t
+    jerking = turning * by_t
+    steep = half * by_r
     terms = np.empty((len(_TERMS), *lost.shape))
-    terms[0] = noise * alpha
-    terms[1] = speed * beta
-    terms[2] = (0.5 * gamma) * turning
-    terms[3] = turning * (8.0 * alpha * beta + gamma * (beta - 2.0 * alpha - 4.0)) / (8.0 * remaining)
-    terms[4] = (turning * by_t) * (0.25 * beta) * surplus / remaining
-    terms[5] = (turning * by_t * by_t) * (0.25 * gamma) * surplus / remaining
+    terms[0] = noise * (lost * (2.0 - lost))
+    terms[1] = speed * (2.0 * lost * lost)
+    terms[2] = turning * half
+    terms[3] = turning * (steep * (3.0 - 2.0 * lost))
+    terms[4] = jerking * (2.0 * lost * steep)
+    terms[5] = (jerking * by_t) * (gamma * steep / lost)
     return terms
 
 
-def with_velocity(terms: Floats, noise: Floats) -> tuple[Floats, Floats, Floats]:
-    """Best gains (3, ...), the residual's variance, and the terms (6, ...) after a measured velocity with noise variances."""
+def with_velocity(terms: Floats, noise: Floats) -> tuple[Three, Floats, Floats]:
+    """Best gains, the residual's variance, and the terms (6, ...) after a measured velocity with noise variances."""
     ss, sv, sa, vv, va, aa = terms
     s = vv + noise
-    gain = np.stack([sv, vv, va]) / s
     kept = noise / s
-    by_s, _, by_a = gain
-    return gain, s, np.stack([ss - by_s * sv, sv * kept, sa - by_s * va, vv * kept, va * kept, aa - by_a * va])
+    by_s, by_a = sv / s, va / s
+    less = np.stack([ss - by_s * sv, sv * kept, sa - by_s * va, vv * kept, va * kept, aa - by_a * va])
+    return (by_s, vv / s, by_a), s, less

@@ -39,15 +39,15 @@ def memory(gamma: Floats) -> Floats:
     return np.asarray(1.0 - lost_memory(gamma))
 
 
-def gains(gamma: Floats, interval_s: Floats) -> Floats:
-    """The steady gains (3, ...) of position, velocity (1/s) and acceleration (1/s2). Source: 002-1, eq 3."""
+def gains(gamma: Floats, interval_s: Floats) -> tuple[Floats, Floats, Floats]:
+    """The steady gains of position, velocity (1/s) and acceleration (1/s2), each (...). Source: 002-1, eq 3."""
     return gains_of(lost_memory(gamma), gamma, interval_s)
 
 
-def gains_of(lost: Floats, gamma: Floats, interval_s: Floats) -> Floats:
+def gains_of(lost: Floats, gamma: Floats, interval_s: Floats) -> tuple[Floats, Floats, Floats]:
     """The same where 1 - r is known already."""
     swift = lost / interval_s
-    return np.array((lost * (2.0 - lost), 2.0 * lost * swift, 0.5 * gamma / (interval_s * interval_s)))
+    return lost * (2.0 - lost), 2.0 * lost * swift, 0.5 * gamma / (interval_s * interval_s)
 
 
 def gamma_for(squared_ratio: Floats) -> Floats:

@@ -135,7 +135,8 @@ def test_the_running_covariance_settles_to_the_closed_form() -> None:
     state = start(np.zeros((1, 1)), np.full((1, 1), 20.0), tuning)
     for _ in range(400):
         state, _ = update(predict(state, np.full(1, 0.4)), np.zeros((1, 1)), np.full((1, 1), 20.0), tuning)
-    expected = settled(lost_memory(np.full((1, 1), 0.05)), np.full((1, 1), 0.4), np.full((1, 1), 400.0))
+    gamma = np.full((1, 1), 0.05)
+    expected = settled(lost_memory(gamma), gamma, np.full((1, 1), 0.4), np.full((1, 1), 400.0))
     np.testing.assert_allclose(state.terms, expected, rtol=1e-8)
 
 
