@@ -3,7 +3,7 @@
     python tests/fuzz/atheris_wires.py DOOR [libFuzzer's options, such as -max_total_time=60]
 
 DOOR: live (a byte a part says what it is, then a length and the part), or a kind of file: tlog, pcap, pcapng, BIN, ulg, plan,
-waypoints. An exception ends it, the input is kept as crash-*.
+waypoints. An exception ends it, and so does what takes longer than a minute; the input is kept in build/fuzz/.
 """
 
 from __future__ import annotations
@@ -58,10 +58,10 @@ def of_file(path: Path, data: bytes) -> None:
 
 def main() -> None:
     """Fuzz one door."""
-    door, options = (
-        sys.argv[1],
-        [sys.argv[0], f"-max_len={_LONGEST if sys.argv[1] == 'live' else 1 << 16}", *sys.argv[2:]],
-    )
+    door, kept = sys.argv[1], Path("build/fuzz")
+    kept.mkdir(parents=True, exist_ok=True)
+    longest = _LONGEST if door == "live" else 1 << 16
+    options = [sys.argv[0], f"-max_len={longest}", "-timeout=60", f"-artifact_prefix={kept}/", *sys.argv[2:]]
     with tempfile.TemporaryDirectory(prefix="talkdown-atheris-") as made:
         seeds = Path(made) / "seeds"
         seeds.mkdir()

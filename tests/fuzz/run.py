@@ -82,7 +82,7 @@ class Fuzzer:
 
     def datagrams(self, number: int, until: float) -> None:
         """So many datagrams through live sessions."""
-        warm, level = number // 5, 0.0
+        warm, level, self.began = number // 5, 0.0, time.monotonic()
         session, left = Episode(), EPISODE
         while self.done < number and time.monotonic() < until:
             if left <= 0:
