@@ -1,8 +1,9 @@
 """Renders the pictures of README and docs from an archived session, in the real viewer, without a screen.
 
-    python docs/make_pictures.py SESSION.rrd OUT.png [--at 0.8] [--size 1600x900] [--view NAME]
+    python docs/make_pictures.py SESSION.rrd OUT.png [--at 0.8] [--size 1600x900] [--page NAME] [--view NAME]
 
-`--at` is the part of the session at which the cursor stands, `--view` the name of one view instead of the whole window.
+`--at` is the part of the session at which the cursor stands, `--page` the tab of the window that is in front (Picture, Health),
+`--view` the name of one view instead of the whole window.
 Needs a GPU or Mesa's software Vulkan (Debian: apt-get install mesa-vulkan-drivers libgl1 libegl1 libxkbcommon-x11-0).
 """
 
@@ -78,17 +79,35 @@ def opened(client: ViewerClient, session: Path) -> tuple[int, int]:
     raise SystemExit(f"The viewer finds no session in {session}.")
 
 
+def turn_to(client: ViewerClient, page: str) -> None:
+    """Bring the page of this name to the front; exits with a sentence when there is none."""
+    blueprint = client.get_blueprint(of="recording").blueprint
+    containers = {
+        path: parts["ContainerBlueprint"] for path, parts in blueprint.items() if "ContainerBlueprint" in parts
+    }
+    named = {container["display_name"]: path for path, container in containers.items() if "display_name" in container}
+    if page not in named:
+        raise SystemExit(f"There is no page {page!r}; there are: {', '.join(sorted(named))}.")
+    for container in containers.values():
+        if named[page] in container["contents"]:
+            container["active_tab"] = named[page]
+    client.set_blueprint(blueprint, of="recording")
+
+
 def picture(
     session: Path,
     out: Path,
     at: Annotated[float, typer.Option(min=0.0, max=1.0)] = 0.8,
     size: str = "1600x900",
+    page: str | None = None,
     view: str | None = None,
 ) -> None:
     """Render one picture of a session."""
     with viewer(size) as client:
         first, last = opened(client, session)
         instant = np.datetime64(int(first + at * (last - first)), "ns")
+        if page is not None:
+            turn_to(client, page)
         client.set_time("utc", timestamp=instant, play_state="paused")
         time.sleep(7.0)  # the plots settle, and the viewer's own notices go
         names = {one.name: one.view_id for one in client.get_state().views}

@@ -15,6 +15,7 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 OUT = DOCS / "pictures"
 FLIGHT = DOCS.parent / "tests" / "data" / "sitl-landing-excerpt.tlog"
+LOG = FLIGHT.with_suffix(".BIN")
 PROGRAM = Path(sys.executable).with_name("talkdown")
 SCOPE = "Precision approach: elevation over azimuth, x10"
 
@@ -56,6 +57,8 @@ def main() -> None:
         (seen,) = (work / "seen").iterdir()
         talkdown("replay", FLIGHT, seen, "--site", site, "--viewer", "none", "--archive", work / "sitl")
         draw(only_session(work / "sitl") / "session.rrd", "sitl", "--at", "0.985")
+        talkdown("replay", LOG, seen, "--from", "11:45", "--site", site, "--viewer", "none", "--archive", work / "log")
+        draw(only_session(work / "log") / "session.rrd", "health", "--at", "0.7", "--page", "Health")
 
 
 if __name__ == "__main__":
