@@ -32,6 +32,7 @@ GREATEST_LESSON = (
     9.0  # normalised squared residual: what a manoeuvre or an outlier teaches of the calm target is bounded
 )
 SHORTEST_S = 1e-3  # that a fixed q is taken over
+SPED_S = 10.0  # how long a measured velocity makes steady gains, which know of none, too high
 UNKNOWN_SPEED_MPS, UNKNOWN_ACCELERATION_MPS2 = 100.0, 5.0  # sigmas of what is not measured at the start
 
 
@@ -65,6 +66,7 @@ class Estimate:
     density: Floats  # (n, axes) m2/s5, of the calm target
     surprises: Floats  # (WINDOW, n, axes) squared residuals over what was expected, latest last
     p: Floats  # (n, axes) their mean within its bounds
+    sped_s: Floats  # (n, axes) since a velocity was measured, inf = never
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,8 +115,10 @@ def start(
     terms = np.stack([sigma * sigma, zero, zero, spread * spread, zero, sure])
     speed = zero if velocity is None else np.where(known, velocity, 0.0)
     density = np.full_like(zero, tuning.density)
-    one = np.ones_like(zero)
-    return Estimate(position, speed, zero, terms, zero, density, np.ones((WINDOW, *zero.shape)), one)
+    sped = np.where(known, 0.0, np.inf)
+    return Estimate(
+        position, speed, zero, terms, zero, density, np.ones((WINDOW, *zero.shape)), np.ones_like(zero), sped
+    )
 
 
 def predict(state: Estimate, elapsed_s: Floats) -> Estimate:
@@ -122,8 +126,8 @@ def predict(state: Estimate, elapsed_s: Floats) -> Estimate:
     t = elapsed_s[:, None]
     velocity = state.velocity + t * state.acceleration
     position = state.position + (0.5 * t) * (state.velocity + velocity)
-    since = state.since_s + t
-    return Estimate(position, velocity, state.acceleration, state.terms, since, state.density, state.surprises, state.p)
+    kept = (state.acceleration, state.terms, state.since_s + t, state.density, state.surprises, state.p)
+    return Estimate(position, velocity, *kept, state.sped_s + t)
 
 
 def covariance(state: Estimate) -> Floats:
@@ -181,7 +185,8 @@ def update(
         prior = _now(state, density)
         cross = prior[:3] if share is None else (share * prior[0], share * prior[1], share * prior[2])
         s = noise + (prior[0] if share is None else share * cross[0])
-        gain = _followed(gain, prior, s if share is None else prior[0] + noise, velocity)
+        sped = state.sped_s < SPED_S if velocity is None else (state.sped_s < SPED_S) | ~np.isnan(velocity)
+        gain = _followed(gain, prior, s if share is None else prior[0] + noise, sped)
         gain, bounded, outlying = _bounded(gain, s, squared, tuning)
         terms, expected = reduced(prior, cross, bounded, gain), s
     else:
@@ -191,33 +196,34 @@ def update(
         gain, _, outlying = _bounded(gain, s, squared, tuning)
         terms = settled(most, np.maximum(gamma, q), interval, noise)
     learnt = measured if share is None else measured & (share == 1.0)
-    surprises, p, taught = _lessons(state, density, squared / expected, learnt, tuning)
+    surprise = squared / expected
     told = Innovation(y, s if whole else np.where(measured, s, 1.0), measured, outlying, gamma)
     before = (state.position, state.velocity, state.acceleration)
     after = (before[0] + gain[0] * y, before[1] + gain[1] * y, before[2] + gain[2] * y)
-    touched = measured
+    touched, sped_s, axes = measured, state.sped_s, y.shape[1]
     if velocity is not None:
         if not whole:
             terms = np.where(measured, terms, _now(state, density))
         after, terms, told = _sped(after, terms, velocity, velocity_sigma, told)
-        touched = measured | ~np.isnan(velocity)
+        sped, off = told.measured[:, axes:], told.innovation[:, axes:]
+        surprise = np.where(sped, off * off / told.variance[:, axes:], surprise)  # it shows a manoeuvre sooner
+        touched, learnt, sped_s = measured | sped, learnt | sped, np.where(sped, 0.0, sped_s)
+    surprises, p, density = _lessons(state, density, surprise, learnt, tuning)
     since = np.zeros_like(y)
     if not touched.all():
         terms, since = np.where(touched, terms, state.terms), np.where(touched, since, state.since_s)
-    return Estimate(*after, terms, since, taught, surprises, p), told
+    return Estimate(*after, terms, since, density, surprises, p, sped_s), told
 
 
-def _followed(steady: Three, prior: Terms, s: Floats, velocity: Floats | None) -> Three:
-    """The gains: steady ones, or the covariance's own where it knows the position worse, or where there is a velocity.
+def _followed(steady: Three, prior: Terms, s: Floats, sped: Bools) -> Three:
+    """The gains: steady ones, or the covariance's own where it knows the position worse, or the velocity was measured lately.
 
     `s` of an axis measured in part is as if it were measured whole: its best gain would exceed 1 on what the other axes are
     told too, and together they would swing.
     """
-    own = prior[0] / s
-    follows = own > steady[0]
-    if velocity is not None:
-        follows |= ~np.isnan(velocity)
     by_s = 1.0 / s
+    own = prior[0] * by_s
+    follows = sped | (own > steady[0])
     return (
         np.where(follows, own, steady[0]),
         np.where(follows, prior[1] * by_s, steady[1]),
