@@ -28,9 +28,7 @@ Bools = NDArray[np.bool_]
 WINDOW = 10  # residuals that p is the mean of
 LEAST_GAMMA, GREATEST_GAMMA = 1e-6, 3.5
 LEAST_DENSITY, GREATEST_DENSITY = 1e-6, 1e6  # m2/s5
-GREATEST_LESSON = (
-    9.0  # normalised squared residual: what a manoeuvre or an outlier teaches of the calm target is bounded
-)
+GREATEST_LESSON = 9.0  # squared residual, normalised: what an outlier teaches of the calm target is bounded
 SHORTEST_S = 1e-3  # that a fixed q is taken over
 SPED_S = 10.0  # how long a measured velocity makes steady gains, which know of none, too high
 UNKNOWN_SPEED_MPS, UNKNOWN_ACCELERATION_MPS2 = 100.0, 5.0  # sigmas of what is not measured at the start
@@ -45,9 +43,7 @@ class Tuning:
     learning: float = 0.02  # of the logarithm of the density, for each unit of surprise; 0 = never
     least_p: float = 0.3  # without a floor a target without noise would freeze the filter
     greatest_p: float = 30.0
-    follows_covariance: bool = (
-        True  # False: as printed, gains and covariance of the steady state from the first update on
-    )
+    follows_covariance: bool = True  # False: as printed, gains and covariance of the steady state throughout
     robust: float | None = None  # sigmas beyond which a residual pulls no more
 
 
