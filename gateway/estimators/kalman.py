@@ -42,6 +42,8 @@ class Innovation:
     measured: Bools
     normalised: Floats  # (n,) squared, y' S^-1 y, chi-square with as many degrees as were measured
     outlying: Bools  # (n,) so far out that the noise was raised
+    sensitivity: Floats  # (n, m, 9) or (1, m, 9), the measurement's derivative by the state, 0 where not measured
+    inverse: Floats  # (n, m, m) of the covariance
 
     @property
     def log_likelihood(self) -> Floats:
@@ -116,14 +118,20 @@ _OF_VELOCITY = _blocks((VELOCITY, VELOCITY))
 
 
 def update(
-    state: Estimate, innovation: Floats, sensitivity: Floats, variance: Floats, robust: float | None = None
+    state: Estimate,
+    innovation: Floats,
+    sensitivity: Floats,
+    variance: Floats,
+    robust: float | None = None,
+    together: int = 1,
 ) -> tuple[Estimate, Innovation]:
     """One measurement for each of n tracks; components that are NaN in `innovation` (n, m) are left out.
 
     `sensitivity` (n, m, 9) or (1, m, 9) is the measurement's derivative by the state, `variance` (n, m) that of its
     independent noise. With `robust` (sigmas for each degree of freedom), what lies further out has its noise raised
     until it is just there (Huber's weight): an outlier pulls no more than a bounded amount, and a source that really has
-    jumped is followed all the same.
+    jumped is followed all the same. Rows in groups of `together` are guesses at one track (`modes`): the noise is raised
+    in all of them by what the nearest asks for, so that an outlier does not tell them apart.
     Joseph's form: the covariance stays symmetric and positive whatever the rounding.
     Source: 003 2.4 eq 19, 20.
     """
@@ -144,10 +152,16 @@ def update(
     outlying = np.zeros(len(y), dtype=np.bool_)
     if robust is not None:
         limit = robust * robust * np.maximum(measured.sum(axis=1), 1)
-        outlying = normalised > limit
+        nearest: slice | NDArray[np.int64] = slice(None)
+        if together > 1:
+            first = np.arange(0, len(y), together)
+            nearest = np.repeat(first + normalised.reshape(-1, together).argmin(axis=1), together)
+        best = normalised[nearest]
+        outlying = best > limit
         if outlying.any():
             # S must grow by the factor, not R: a confident prediction would otherwise hold out for ever.
-            growth = (np.where(outlying, normalised / limit, 1.0)[:, None] - 1.0) * s[:, _ALONG[:m], _ALONG[:m]]
+            spread = s[:, _ALONG[:m], _ALONG[:m]][nearest]
+            growth = (np.where(outlying, best / limit, 1.0)[:, None] - 1.0) * spread
             growth = np.where(missing, 0.0, growth)
             r = r + growth
             s[:, _ALONG[:m], _ALONG[:m]] += growth
@@ -155,10 +169,11 @@ def update(
     gain = cross @ inverse
     mean = state.mean + (gain @ column)[:, :, 0]
     reduced = _IDENTITY - gain @ h
-    spread = (gain * r[:, None, :]) @ gain.transpose(0, 2, 1)
-    covariance = reduced @ state.covariance @ reduced.transpose(0, 2, 1) + spread
+    noise = (gain * r[:, None, :]) @ gain.transpose(0, 2, 1)
+    covariance = reduced @ state.covariance @ reduced.transpose(0, 2, 1) + noise
     covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))
-    return Estimate(mean, covariance), Innovation(y, s, measured, normalised, outlying)
+    told = Innovation(y, s, measured, normalised, outlying, h, np.asarray(inverse))
+    return Estimate(mean, covariance), told
 
 
 _IDENTITY = np.eye(SIZE)

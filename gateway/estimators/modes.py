@@ -1,0 +1,268 @@
+"""Interacting multiple models: one Kalman filter for each way of moving (straight, left, right), weighed by how it fits.
+
+The state is `kalman`'s nine numbers, once a mode. Arrays are over n tracks and m modes; the filters of all modes of all
+tracks run as one batch of n m rows, and the bits of one track do not depend on how many come along.
+
+What tells the modes apart (`Modes.rule`):
+
+`imm`       the likelihood of the measurement: Blom's and Bar-Shalom's filter, eq 5 to 10, 14, 15
+`rmimm`     the same, and a mode whose residuals have a mean that is not 0 counts less: a wrong mode is wrong to one side
+`literal`   as printed: the likelihood over the norm of the mean of the last five residuals
+
+Source: 000 2.1.2 eq 5 to 15.
+Deviation: eq 11's mean residual is not defined in the print, and one over its norm is singular and depends on units.
+`rmimm` takes the score, the derivative h' S^-1 y of the log-likelihood by the position, faded from update to update, with
+its expected spread J = h' S^-1 h faded likewise, and weighs by (1 + s' J^-1 s)^(-1/2): whatever was measured counts by what
+it says of the position, no unit matters, and the weight is at most 1 and never singular. The printed exception for a mean
+residual of exactly 0 would throw out the mode that fits exactly; `literal` bounds the norm from below instead.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.estimators.kalman import POSITION, SIZE, Estimate, Innovation, Motion
+from gateway.estimators.kalman import update as update_each
+from gateway.estimators.turning import carried
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Rule = Literal["imm", "rmimm", "literal"]
+
+GRAVITY_MPS2 = 9.80665
+LEAST_SPEED_MPS = 5.0  # below it a bank says nothing of the turn rate
+LEAST_WEIGHT = 1e-6  # of a mode: none is ever impossible
+START_TURNING = 0.1  # what appears is seldom in a turn
+WINDOW = 5  # residuals that `literal` takes the mean of
+LEAST_RESIDUAL_M = 1e-3  # `literal` is singular at 0
+
+
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """One way of moving. `turn` is a multiple of the set's turn rate: 0 is straight, positive to the left."""
+
+    turn: float
+    motion: Motion
+
+
+@dataclass(frozen=True, slots=True)
+class Modes:
+    """A set of modes and how they follow each other.
+
+    The turn rate is `turn_rate_rps`, or that of a level turn at `bank_rad` where this is more: 3 degrees/s is a standard
+    turn of an airliner, while a drone of 15 m/s turns at 20.
+    """
+
+    modes: tuple[Mode, ...]
+    rule: Rule = "rmimm"
+    stays_s: float = 33.0  # mean time in a mode; then all others are as likely
+    turn_rate_rps: float = math.radians(3.0)
+    bank_rad: float = math.radians(30.0)
+    fade: float = 0.92  # of the residuals' mean, an update
+
+    @property
+    def count(self) -> int:
+        """How many modes there are."""
+        return len(self.modes)
+
+    def turn_rate(self, speed_mps: Floats) -> Floats:
+        """Turn rate (n, m) in rad/s, positive to the left, of each mode at level speeds (n,)."""
+        banked = GRAVITY_MPS2 * math.tan(self.bank_rad) / np.maximum(speed_mps, LEAST_SPEED_MPS)
+        turns = np.array([mode.turn for mode in self.modes])
+        return np.asarray(np.maximum(banked, self.turn_rate_rps)[:, None] * turns)
+
+    def transition(self, elapsed_s: Floats) -> Floats:
+        """Probabilities (n, m, m) of being in mode j after times (n,), having been in mode i.
+
+        Modes are left at a constant rate, so that two short times equal one long one.
+        Source: 000 2.1.2, p_ij. Deviation: of the time since the last update, never of a fixed period.
+        """
+        m = self.count
+        if m == 1:
+            return np.ones((len(elapsed_s), 1, 1))
+        other = -np.expm1(elapsed_s * (-m / ((m - 1) * self.stays_s))) / m
+        return np.asarray(np.eye(m) + other[:, None, None] * (np.ones((m, m)) - m * np.eye(m)))
+
+
+@dataclass(frozen=True, slots=True)
+class Mixture:
+    """n tracks in m modes: mean (n, m, 9), covariance (n, m, 9, 9), weight (n, m), which sums to 1.
+
+    What is remembered of the residuals: their faded score (n, m, 3) with its information (n, m, 3, 3), and for `literal` the
+    last ones in metres (n, m, 5, 3), NaN before they are (for the other rules there is none).
+    """
+
+    mean: Floats
+    covariance: Floats
+    weight: Floats
+    score: Floats
+    information: Floats
+    recent: Floats
+
+    def each(self) -> Estimate:
+        """The modes' states as n m rows, those of one track together."""
+        return Estimate(self.mean.reshape(-1, SIZE), self.covariance.reshape(-1, SIZE, SIZE))
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What measurements of k components told n tracks, in all: the modes' innovations as one Gaussian."""
+
+    prior: Floats  # (n, m) the modes' weights before it
+    each: Innovation  # of every mode, n m rows
+    mode_log_likelihood: Floats  # (n, m)
+
+    @property
+    def innovation(self) -> Floats:
+        """(n, k), 0 where nothing was measured."""
+        return np.asarray((self.prior[:, None, :] @ self._shaped(self.each.innovation))[:, 0])
+
+    @property
+    def covariance(self) -> Floats:
+        """(n, k, k), with the spread between the modes."""
+        off = self._shaped(self.each.innovation) - self.innovation[:, None]
+        spread = self._shaped(self.each.covariance) + off[..., :, None] * off[..., None, :]
+        return np.asarray((self.prior[:, :, None, None] * spread).sum(axis=1))
+
+    @property
+    def normalised(self) -> Floats:
+        """Squared, y' S^-1 y, (n,)."""
+        y = self.innovation[:, :, None]
+        return np.asarray((y.transpose(0, 2, 1) @ np.linalg.inv(self.covariance) @ y)[:, 0, 0])
+
+    @property
+    def outlying(self) -> Bools:
+        """Whether no mode expected it, (n,), so that its noise was raised."""
+        return self.each.outlying.reshape(self.prior.shape)[:, 0]
+
+    @property
+    def log_likelihood(self) -> Floats:
+        """Natural logarithm of the density of the measured components, (n,), under the mixture."""
+        log = np.log(self.prior) + self.mode_log_likelihood
+        greatest = log.max(axis=1)
+        return np.asarray(greatest + np.log(np.exp(log - greatest[:, None]).sum(axis=1)))
+
+    def _shaped(self, rows: Floats) -> Floats:
+        return rows.reshape(*self.prior.shape, *rows.shape[1:])
+
+
+def begin(state: Estimate, modes: Modes) -> Mixture:
+    """Mixtures of n tracks that were just started, most likely straight."""
+    n, m = len(state.mean), modes.count
+    turning = np.array([mode.turn != 0.0 for mode in modes.modes])
+    share = np.where(turning, START_TURNING / max(turning.sum(), 1), 1.0)
+    share[~turning] = (1.0 - share[turning].sum()) / max((~turning).sum(), 1)
+    return Mixture(
+        np.repeat(state.mean[:, None], m, axis=1),
+        np.repeat(state.covariance[:, None], m, axis=1),
+        np.repeat((share / share.sum())[None], n, axis=0),
+        np.zeros((n, m, 3)),
+        np.zeros((n, m, 3, 3)),
+        np.full((n, m, WINDOW if modes.rule == "literal" else 0, 3), math.nan),
+    )
+
+
+def combine(mixture: Mixture) -> Estimate:
+    """One Gaussian a track with the mixture's mean and covariance. Source: 000 2.1.2 eq 14, 15."""
+    mean, covariance = _matched(mixture.weight[:, :, None], mixture.mean, mixture.covariance)
+    return Estimate(mean[:, 0], covariance[:, 0])
+
+
+def predict(mixture: Mixture, elapsed_s: Floats, modes: Modes, transition: Floats | None = None) -> Mixture:
+    """The mixtures `elapsed_s` (n,), not negative, later: modes mix, then each moves in its own way.
+
+    `transition` (n, m, m) stands in for the set's own where more is known of what comes next.
+    Source: 000 2.1.2 eq 5 to 7. Deviation: eq 3 and 4 are lost in the print; see `turning.carried`.
+    """
+    chance = modes.transition(elapsed_s) if transition is None else transition
+    joint = mixture.weight[:, :, None] * chance
+    weight = joint.sum(axis=1)
+    mean, covariance = mixture.mean, mixture.covariance
+    if modes.count > 1:
+        mean, covariance = _matched(joint / weight[:, None], mean, covariance)
+    level = (weight[:, None, :] @ mean[:, :, 3:5])[:, 0]
+    rate = modes.turn_rate(np.sqrt(level[:, 0] * level[:, 0] + level[:, 1] * level[:, 1]))
+    carry, noise = carried([mode.motion for mode in modes.modes], elapsed_s, rate)
+    mean = (carry @ mean[..., None])[..., 0]
+    covariance = carry @ covariance @ carry.swapaxes(-1, -2) + noise
+    covariance = 0.5 * (covariance + covariance.swapaxes(-1, -2))
+    return Mixture(mean, covariance, weight, mixture.score, mixture.information, mixture.recent)
+
+
+def _matched(share: Floats, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+    """Means (n, j, 9) and covariances (n, j, 9, 9) of the Gaussians that match m ones in shares (n, m, j)."""
+    matched = share.transpose(0, 2, 1) @ mean
+    off = mean[:, :, None] - matched[:, None]
+    spread = covariance[:, :, None] + off[..., :, None] * off[..., None, :]
+    return matched, np.asarray((share[..., None, None] * spread).sum(axis=1))
+
+
+def update(
+    mixture: Mixture,
+    innovation: Floats,
+    sensitivity: Floats,
+    variance: Floats,
+    modes: Modes,
+    robust: float | None = None,
+) -> tuple[Mixture, Told]:
+    """One measurement for each of n tracks, by every mode: arrays over n m rows as in `kalman.update`."""
+    after, told = update_each(mixture.each(), innovation, sensitivity, variance, robust, modes.count)
+    return weigh(mixture, after, told, modes)
+
+
+def weigh(mixture: Mixture, after: Estimate, told: Innovation, modes: Modes) -> tuple[Mixture, Told]:
+    """The mixtures after an update of each mode, n m rows, of which the mixtures before it were `mixture`.
+
+    The likelihoods are normalised once, as logarithms; no weight falls below a millionth.
+    Source: 000 2.1.2 eq 10 to 12.
+    """
+    n, m = mixture.weight.shape
+    column = told.innovation[:, :, None]
+    fit = (column.transpose(0, 2, 1) @ told.inverse @ column)[:, 0, 0]
+    _, log_determinant = np.linalg.slogdet(told.covariance)
+    degrees = told.measured.sum(axis=1)
+    likelihood = (-0.5 * (fit + log_determinant + degrees * math.log(2.0 * math.pi))).reshape(n, m)
+    score, information, recent = mixture.score, mixture.information, mixture.recent
+    log = np.log(mixture.weight) + likelihood
+    if modes.rule == "rmimm":
+        score, information = _faded(mixture, told, modes.fade)
+        log -= 0.5 * np.log1p(_excess(score, information))
+    elif modes.rule == "literal":
+        recent = np.concatenate([recent[:, :, 1:], _in_metres(told).reshape(n, m, 1, 3)], axis=2)
+        mean = np.where(np.isnan(recent), 0.0, recent).sum(axis=2) / np.maximum((~np.isnan(recent)).sum(axis=2), 1)
+        log -= np.log(np.maximum(np.sqrt((mean * mean).sum(axis=2)), LEAST_RESIDUAL_M))
+    weight = np.exp(log - log.max(axis=1, keepdims=True))
+    weight = np.maximum(weight / weight.sum(axis=1, keepdims=True), LEAST_WEIGHT)
+    weight /= weight.sum(axis=1, keepdims=True)
+    mean, covariance = after.mean.reshape(n, m, SIZE), after.covariance.reshape(n, m, SIZE, SIZE)
+    return Mixture(mean, covariance, weight, score, information, recent), Told(mixture.weight, told, likelihood)
+
+
+def _faded(mixture: Mixture, told: Innovation, fade: float) -> tuple[Floats, Floats]:
+    """Score and information after an update: h' S^-1 y, h' S^-1 h by the position, added to what is left of the old."""
+    sensitivity = told.sensitivity[:, :, POSITION]
+    by_position = sensitivity.transpose(0, 2, 1) @ told.inverse
+    score = (by_position @ told.innovation[:, :, None]).reshape(mixture.score.shape)
+    information = (by_position @ sensitivity).reshape(mixture.information.shape)
+    return fade * mixture.score + score, fade * fade * mixture.information + information
+
+
+def _excess(score: Floats, information: Floats) -> Floats:
+    """s' J^-1 s, (n, m): chi-square with up to three degrees for a mode that is right; what was never measured adds 0."""
+    size = np.maximum(1e-9 * information[..., _AXES, _AXES].sum(axis=-1), 1e-30)
+    lifted = information + size[..., None, None] * np.eye(3)
+    return np.maximum((score[..., None, :] @ np.linalg.inv(lifted) @ score[..., :, None])[..., 0, 0], 0.0)
+
+
+_AXES = np.arange(3)
+
+
+def _in_metres(told: Innovation) -> Floats:
+    """Innovations as displacements of the position (n m, 3), by least squares."""
+    sensitivity = np.broadcast_to(told.sensitivity[:, :, POSITION], (*told.innovation.shape, 3))
+    return np.asarray((np.linalg.pinv(sensitivity) @ told.innovation[:, :, None])[:, :, 0])
