@@ -51,7 +51,7 @@ def take(datagrams: Sequence[bytes], which: Wanted) -> tuple[list[Head], list[by
     """
     count = len(datagrams)
     sizes = np.fromiter(map(len, datagrams), np.int64, count)
-    block = np.frombuffer(b"".join((*datagrams, bytes(12))), np.uint8)
+    block = np.frombuffer(b"".join((*datagrams, bytes(16))), np.uint8)  # a header behind the last one, were it empty
     end = np.cumsum(sizes)
     start = end - sizes
     first = np.ndarray(len(block) - 3, "<u4", block, strides=(1,))[start]  # magic, length, two flags

@@ -269,3 +269,17 @@ def test_an_item_of_a_plan_as_high_as_no_number_should_be_has_no_altitude() -> N
     point = plan_point(1, 16, 3, 31.0, 104.0, 1e38)
     assert point is not None
     assert point.altitude_above_home_m is None
+
+
+@pytest.mark.parametrize("last", [b"", b"L", b"LR\x01"])
+def test_a_radars_stub_of_a_datagram_behind_many_frames_is_refused_as_any_other(last: bytes) -> None:
+    """Many arrivals are taken together, those of radars among them; nothing may be read behind the last."""
+    encoder = FrameEncoder(1)
+    frames = [encoder.encode("SYSTEM_TIME", time_unix_usec=5, time_boot_ms=7) for _ in range(150)]
+    arrivals = [Arrival(T0 + place * 4000, 0, frame) for place, frame in enumerate(frames)]
+    arrivals.append(Arrival(T0 + SECOND, 1, last))
+    decoder = Decoder([Source(0, "mavlink", "mavlink-1", "here"), Source(1, "radar", "radar-1", "there")])
+    for arrival, taken in zip(arrivals, decoder.taken(arrivals), strict=True):
+        decoder.hear(arrival, taken)
+    assert decoder.counters()["mavlink-1 frames"] == 150
+    assert decoder.counters()["radar-1 length"] == 1
