@@ -82,9 +82,10 @@ class Meter:
 
 def measure(vehicles: int, rate: int, seconds: int, *, default_buffer: bool = False) -> dict[str, Any]:
     """One run: the gateway in here, the telemetry of another process."""
-    from gateway.runtime.links import RECEIVE_BUFFER_BYTES, UdpLink
+    from gateway.runtime.links import RECEIVE_BUFFER_BYTES
     from gateway.runtime.loop import run_live
     from gateway.runtime.setup import Place, Setup
+    from gateway.runtime.udp import UdpLink
     from gateway.runtime.urls import Url
     from gateway.settings import DEMO_SITE, format_site
 

@@ -139,7 +139,7 @@ def register(app: typer.Typer) -> None:
 
 def buffer_of(link: Link) -> str:
     """What the system granted for a burst; it may be less than was asked for, and says so nowhere else."""
-    from gateway.runtime.links import UdpLink
+    from gateway.runtime.udp import UdpLink
 
     return f" The system holds {link.granted_bytes // 1024} KiB for it." if isinstance(link, UdpLink) else ""
 

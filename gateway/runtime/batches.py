@@ -18,12 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.runtime.emptying import CONTROL_BYTES, DATAGRAMS, NAME_BYTES, SLOT_BYTES
+
 SO_TIMESTAMPNS = 35  # not in Python's socket module; the kernel's time of arrival
 SO_RXQ_OVFL = 40  # not in Python's socket module; datagrams that the kernel had to drop
-_DATAGRAMS = 128
-_SLOT_BYTES = 65_536 + 576  # any datagram; the odd size spreads the slots' beginnings over the processor's caches
-_NAME_BYTES = 32
-_CONTROL_BYTES = 64
 _PEERS_REMEMBERED = 4096
 _STAMP_HEADER = (32, socket.SOL_SOCKET | SO_TIMESTAMPNS << 32)  # of a control message: its size, level and kind
 _DROPS_HEADER = (20, socket.SOL_SOCKET | SO_RXQ_OVFL << 32)
@@ -45,7 +43,7 @@ class Datagrams:
 
 
 # struct mmsghdr and struct iovec of a 64-bit Linux, the gaps that alignment leaves included.
-_MESSAGE = np.dtype(
+MESSAGE = np.dtype(
     [
         *(("name", np.uint64), ("name_size", np.uint32), ("gap_1", np.uint32)),
         *(("vectors", np.uint64), ("vector_count", np.uint64)),
@@ -71,12 +69,12 @@ class DatagramBatches:
     def __init__(self, receiving: socket.socket, call: Callable[..., int]) -> None:
         self._socket = receiving
         self._call = call
-        self._peers: dict[bytes, str] = {}
-        self._slots = np.empty((_DATAGRAMS, _SLOT_BYTES), np.uint8)
-        self._names = np.zeros((_DATAGRAMS, _NAME_BYTES), np.uint8)
-        self._controls = np.zeros((_DATAGRAMS, _CONTROL_BYTES), np.uint8)
-        vectors, messages = np.zeros(_DATAGRAMS, _VECTOR), np.zeros(_DATAGRAMS, _MESSAGE)
-        vectors["base"], vectors["size"] = _addresses(self._slots), _SLOT_BYTES
+        self._envelopes = Envelopes()
+        self._slots = np.empty((DATAGRAMS, SLOT_BYTES), np.uint8)
+        self._names = np.zeros((DATAGRAMS, NAME_BYTES), np.uint8)
+        self._controls = np.zeros((DATAGRAMS, CONTROL_BYTES), np.uint8)
+        vectors, messages = np.zeros(DATAGRAMS, _VECTOR), np.zeros(DATAGRAMS, MESSAGE)
+        vectors["base"], vectors["size"] = _addresses(self._slots), SLOT_BYTES
         messages["vectors"], messages["vector_count"] = _addresses(vectors), 1
         messages["name"], messages["control"] = _addresses(self._names), _addresses(self._controls)
         self._vectors, self._messages = vectors, messages
@@ -87,41 +85,51 @@ class DatagramBatches:
     def receive(self) -> Datagrams | None:
         """The datagrams that wait, at most 128; None when none does. Raises OSError for what the socket has to report."""
         messages = self._messages
-        messages["name_size"], messages["control_size"] = _NAME_BYTES, _CONTROL_BYTES
-        count = self._call(self._socket.fileno(), self._at, _DATAGRAMS, socket.MSG_DONTWAIT, None)
+        messages["name_size"], messages["control_size"] = NAME_BYTES, CONTROL_BYTES
+        count = self._call(self._socket.fileno(), self._at, DATAGRAMS, socket.MSG_DONTWAIT, None)
         if count < 0:
             code = ctypes.get_errno()
             if code in (errno.EAGAIN, errno.EINTR):
                 return None
             raise OSError(code, "recvmmsg")
-        content, slot = self._bytes, _SLOT_BYTES
+        content, slot = self._bytes, SLOT_BYTES
         sizes = messages["size"][:count].tolist()
         contents = [
             content[start : start + size].tobytes()
             for start, size in zip(range(0, count * slot, slot), sizes, strict=True)
         ]
-        times, dropped = self._told(count)
-        return Datagrams(contents, self._senders(count), times, dropped, count == _DATAGRAMS)
+        heard = messages[:count]
+        times, dropped = self._envelopes.told(heard, self._words[:count])
+        peers = self._envelopes.senders(heard, self._names.tobytes())
+        return Datagrams(contents, peers, times, dropped, count == DATAGRAMS)
 
-    def _senders(self, count: int) -> list[str]:
-        """Who sent each, by name."""
-        known, names = self._peers, []
-        sizes = self._messages["name_size"][:count].tolist()
-        raw, at = self._names.tobytes(), 0
-        for size in sizes:
-            key = raw[at : at + size]
-            at += _NAME_BYTES
-            name = known.get(key)
-            if name is None:
+
+class Envelopes:
+    """Reads what the kernel tells of each datagram beside its content."""
+
+    def __init__(self) -> None:
+        self._peers: dict[bytes, str] = {}
+
+    def senders(self, messages: NDArray[Any], names: bytes) -> list[str]:
+        """Who sent each, by name; `names` holds a socket address of each in `NAME_BYTES`."""
+        known, peers, at = self._peers, [], 0
+        for size in messages["name_size"].tolist():
+            key = names[at : at + size]
+            at += NAME_BYTES
+            peer = known.get(key)
+            if peer is None:
                 if len(known) >= _PEERS_REMEMBERED:
                     known.clear()
-                name = known[key] = _sender(key)
-            names.append(name)
-        return names
+                peer = known[key] = _sender(key)
+            peers.append(peer)
+        return peers
 
-    def _told(self, count: int) -> tuple[list[int | None], int | None]:
-        """The kernel's times of arrival, and its count of drops where it told one: in this order, if both."""
-        words, sizes = self._words[:count], self._messages["control_size"][:count]
+    def told(self, messages: NDArray[Any], words: NDArray[np.int64]) -> tuple[list[int | None], int | None]:
+        """The kernel's times of arrival, and its count of drops where it told one: in this order, if both.
+
+        `words` are the control messages, a row for each datagram.
+        """
+        sizes = messages["control_size"]
         stamped = (sizes >= 32) & (words[:, 0] == _STAMP_HEADER[0]) & (words[:, 1] == _STAMP_HEADER[1])
         nanoseconds = words[:, 2] * 1_000_000_000 + words[:, 3]
         times: list[int | None] = nanoseconds.tolist()

@@ -1,35 +1,19 @@
 """Links: where bytes come in. UDP, TCP client, serial; none of them blocks, none of them sends unless it is told to.
 
 A link answers three questions: what it can be waited on by (`fileno`), what has come in (`receive`), and how it is
-doing (`counters`). The one thing that a link sends by itself is the empty datagram of a `udpout` link, once a second
-until its peer answers: it carries no MAVLink, and without it the peer could not know where we are.
+doing (`counters`).
 """
 
 from __future__ import annotations
 
-import errno
 import socket
-import struct
-import sys
 from collections import Counter
 from dataclasses import dataclass
 from typing import Protocol
 
-from gateway.runtime.batches import SO_RXQ_OVFL, SO_TIMESTAMPNS, batches_of
-from gateway.runtime.urls import LinkError, Url, bracketed
+from gateway.runtime.urls import LinkError, Url
 
 RECEIVE_BUFFER_BYTES = 4 << 20
-_LARGE_BUFFER = 1 << 20  # some 2 700 small datagrams; the system's own choice holds a tenth of it
-_LONG_S, _SHORT_S = 0.01, 0.002
-_LARGEST_DATAGRAM = 65_535
-_DATAGRAMS_A_TURN = 2048  # then the other links have theirs
-_LINUX = sys.platform == "linux"
-_SO_MEMINFO = 55  # not in Python's socket module; nine numbers, the last of which is what the kernel had to drop
-_ANCILLARY_BYTES = 128
-_HELLO_EVERY_NS = 1_000_000_000
-_SILENT_AFTER_NS = 5_000_000_000
-_ASK_DROPS_NS = 1_000_000_000
-_PEERS_REMEMBERED = 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +36,10 @@ class Link(Protocol):
     url: Url
     counters: Counter[str]
     news: list[tuple[str, str]]  # (level, text) to be told once
-    patience_s: float  # how long what comes in can wait for us, at any rate that we can keep up with
+
+    @property
+    def patience_s(self) -> float:
+        """How long what comes in can wait for us, at any rate that we can keep up with, s."""
 
     def fileno(self) -> int | None:
         """What to wait on, or None: closed at the moment, or to be asked at every turn."""
@@ -69,17 +56,26 @@ class Link(Protocol):
     def tend(self, now_ns: int) -> None:
         """Do what is due: say hello, connect again."""
 
+    def finish(self) -> None:
+        """Have all that has come in ready for `receive`, which is asked a last few times."""
+
     def close(self) -> None:
         """Let go of the port."""
 
 
-def open_link(url: Url, receive_buffer_bytes: int | None = RECEIVE_BUFFER_BYTES) -> Link:
+def open_link(
+    url: Url, receive_buffer_bytes: int | None = RECEIVE_BUFFER_BYTES, *, is_drained: bool | None = None
+) -> Link:
     """The open link. The receive buffer is what a UDP link asks for; None leaves it as the system makes it.
+
+    `is_drained`: whether a process of its own empties a UDP link's socket; None: where the buffer is small (Linux).
 
     Raises LinkError: one sentence with what is in the way and what to do.
     """
     if url.scheme in ("udpin", "udpout"):
-        return UdpLink(url, receive_buffer_bytes)
+        from gateway.runtime.udp import UdpLink
+
+        return UdpLink(url, receive_buffer_bytes, is_drained=is_drained)
     from gateway.runtime.streams import SerialLink, TcpLink
 
     return TcpLink(url) if url.scheme == "tcp" else SerialLink(url)
@@ -101,187 +97,3 @@ def addresses(url: Url, kind: socket.SocketKind) -> list[tuple[socket.AddressFam
         raise LinkError(f"{url}: there is no host {url.host!r} to be found; write its address in numbers.") from error
     ordered = sorted(found, key=lambda one: one[0] != socket.AF_INET)
     return [(family, (str(address[0]), int(address[1]))) for family, _, _, _, address in ordered]
-
-
-class UdpLink:
-    """A UDP socket: listening (udpin), or calling on one peer (udpout)."""
-
-    def __init__(self, url: Url, receive_buffer_bytes: int | None = RECEIVE_BUFFER_BYTES) -> None:
-        self.url = url
-        self.counters: Counter[str] = Counter()
-        self.news: list[tuple[str, str]] = []
-        self._dropped = 0
-        self._ask_drops_ns = 0
-        self._hello_due_ns = 0
-        self._heard = False
-        self._senders: dict[str, tuple[str, int]] = {}
-        family, self._address = resolve(url, socket.SOCK_DGRAM)
-        self._socket = socket.socket(family, socket.SOCK_DGRAM)
-        self._batches = batches_of(self._socket)
-        try:
-            self.granted_bytes = self._configure(receive_buffer_bytes)
-            self.patience_s = _LONG_S if self.granted_bytes >= _LARGE_BUFFER else _SHORT_S
-            if url.scheme == "udpin":
-                self._socket.bind(self._address)
-                host, port = self._socket.getsockname()[:2]
-                self.url = Url("udpin", str(host), int(port))
-            else:
-                self._socket.connect(self._address)  # from now on the kernel refuses what others send
-        except OSError as error:
-            self._socket.close()
-            raise LinkError(_why_not(url, error)) from error
-
-    def _configure(self, wanted: int | None) -> int:
-        """Ask for what helps, and read back what was granted: the receive buffer in bytes."""
-        self._socket.setblocking(False)
-        if wanted is not None:
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, wanted)
-        granted = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
-        if _LINUX:
-            granted //= 2  # Linux tells twice what it gives, the other half is its own book-keeping
-            for option in (SO_TIMESTAMPNS, SO_RXQ_OVFL):
-                try:
-                    self._socket.setsockopt(socket.SOL_SOCKET, option, 1)
-                except OSError:
-                    self.counters[f"no socket option {option}"] += 1
-        if wanted is not None and granted < wanted:
-            advice = ", raise net.core.rmem_max to change that" if _LINUX else ""
-            text = f"{self.url}: receive buffer of {granted >> 10} KiB instead of {wanted >> 10} KiB{advice}."
-            self.news.append(("info", text))
-        return granted
-
-    def fileno(self) -> int | None:
-        """The socket's descriptor, or None once closed."""
-        number = self._socket.fileno()
-        return number if number >= 0 else None
-
-    def receive(self) -> Chunks:
-        """The datagrams that wait, at most a turn's worth."""
-        chunks = Chunks([], [], [], None)
-        try:
-            while len(chunks.data) < _DATAGRAMS_A_TURN and self._take(chunks):
-                pass
-        except (BlockingIOError, InterruptedError):
-            pass
-        except OSError as error:  # "nobody there" in answer to what we sent, or a network that went away
-            self._failed(error)
-        self._heard = self._heard or bool(chunks.data)
-        return chunks
-
-    def _take(self, chunks: Chunks) -> bool:
-        """Add the next datagrams; whether there may be more. Raises OSError for what the socket has to report."""
-        if self._batches is None:
-            self._take_one(chunks)
-            return True
-        batch = self._batches.receive()
-        if batch is None:
-            return False
-        if batch.dropped is not None:
-            self._lost(batch.dropped)
-        chunks.peers.extend(batch.peers)
-        chunks.data.extend(batch.contents)
-        chunks.kernel_utc_ns.extend(batch.kernel_utc_ns)
-        return batch.is_full
-
-    def _take_one(self, chunks: Chunks) -> None:
-        kernel_utc_ns: int | None = None
-        if not _LINUX:
-            data, address = self._socket.recvfrom(_LARGEST_DATAGRAM)
-        else:
-            data, ancillary, _, address = self._socket.recvmsg(_LARGEST_DATAGRAM, _ANCILLARY_BYTES)
-            for level, kind, content in ancillary:
-                if (level, kind, len(content)) == (socket.SOL_SOCKET, SO_TIMESTAMPNS, 16):
-                    seconds, nanoseconds = struct.unpack("@qq", content)
-                    kernel_utc_ns = seconds * 1_000_000_000 + nanoseconds
-                elif (level, kind, len(content)) == (socket.SOL_SOCKET, SO_RXQ_OVFL, 4):
-                    self._lost(struct.unpack("@I", content)[0])
-        chunks.peers.append(_named(address) if address else str(self.url))
-        chunks.data.append(data)
-        chunks.kernel_utc_ns.append(kernel_utc_ns)
-
-    def _lost(self, dropped: int) -> None:
-        """The kernel has dropped so many datagrams in all, modulo 2^32."""
-        more = (dropped - self._dropped) % (1 << 32)
-        if not 0 < more < 1 << 31:  # what a datagram says of drops is older than what the socket says when asked
-            return
-        if not self.counters["dropped by the kernel"]:
-            self.news.append(("error", f"{self.url}: datagrams were lost before we could read them (counted)."))
-        self.counters["dropped by the kernel"] += more
-        self._dropped = dropped
-
-    def _ask_drops(self) -> None:
-        """A datagram tells of the drops before it; of those after the last one only the socket itself can tell."""
-        try:
-            told = self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, 36)
-        except OSError:
-            return  # a kernel before 4.12
-        if len(told) == 36:
-            self._lost(struct.unpack("@9I", told)[8])
-
-    def tend(self, now_ns: int) -> None:
-        """Ask for drops. On a udpout link: an empty datagram a second until the peer answers, and when it falls silent."""
-        if _LINUX and now_ns >= self._ask_drops_ns:
-            self._ask_drops()
-            self._ask_drops_ns = now_ns + _ASK_DROPS_NS
-        if self.url.scheme != "udpout" or now_ns < self._hello_due_ns:
-            return
-        if not self._heard:
-            try:
-                self._socket.send(b"")
-                self.counters["empty datagrams sent"] += 1
-            except OSError as error:
-                self._failed(error)
-        self._hello_due_ns = now_ns + (_SILENT_AFTER_NS if self._heard else _HELLO_EVERY_NS)
-        self._heard = False
-
-    def send(self, data: bytes, peer: str | None) -> bool:
-        """Send a datagram: to a peer of a listening link, by the name of its chunks; a calling link has its own."""
-        try:
-            if self.url.scheme == "udpout":
-                self._socket.send(data)
-            elif peer is None:
-                raise BlockingIOError
-            else:
-                self._socket.sendto(data, self._address_of(peer))
-        except OSError as error:
-            self.counters["not sent"] += 1
-            if not isinstance(error, BlockingIOError):
-                self._failed(error)
-            return False
-        return True
-
-    def _address_of(self, peer: str) -> tuple[str, int]:
-        address = self._senders.get(peer)
-        if address is None:
-            if len(self._senders) >= _PEERS_REMEMBERED:
-                self._senders.clear()
-            host, _, port = peer.rpartition(":")
-            address = self._senders[peer] = (host.strip("[]"), int(port))
-        return address
-
-    def _failed(self, error: OSError) -> None:
-        self.counters[f"socket error {errno.errorcode.get(error.errno or 0, 'unknown')}"] += 1
-
-    def close(self) -> None:
-        """Count the last drops, and let go of the port."""
-        if _LINUX and self.fileno() is not None:
-            self._ask_drops()
-        self._socket.close()
-
-
-def _named(address: tuple[object, ...]) -> str:
-    return f"{bracketed(str(address[0]))}:{address[1]}"
-
-
-def _why_not(url: Url, error: OSError) -> str:
-    """Why a UDP port cannot be had, and what to do about it."""
-    if error.errno == errno.EADDRINUSE:
-        return (
-            f"{url}: another program has this port already; close it (a ground station, another talkdown), "
-            f"or have it forward to another port and listen there."
-        )
-    if error.errno == errno.EACCES:
-        return f"{url}: this port may only be used by the administrator; choose one from 1024 up."
-    if error.errno == errno.EADDRNOTAVAIL:
-        return f"{url}: this machine has no address {url.host}; listen on 0.0.0.0 for all that it has."
-    return f"{url}: cannot be opened: {(error.strerror or str(error)).lower()}."

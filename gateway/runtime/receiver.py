@@ -123,6 +123,8 @@ class Receiver:
         try:
             while not self._closing.is_set():
                 self._turn(_WAIT_S)
+            for link in self._links:
+                link.finish()
             for _ in range(_LAST_TURNS):
                 if not self._turn(0.0):
                     break

@@ -65,6 +65,10 @@ class _StreamLink(ABC):
     def _write(self, data: bytes) -> int:
         """Hand bytes to the system; how many it took. Raises BlockingIOError or OSError."""
 
+    def finish(self) -> None:
+        """Send what was left over; what has come in waits for nothing."""
+        self._flush()
+
     @abstractmethod
     def close(self) -> None:
         """Close what is open."""

@@ -9,9 +9,9 @@ import pytest
 
 from adapters.mavlink_frames import encode
 from adapters.tlog import TlogReader
-from gateway.runtime.links import UdpLink
 from gateway.runtime.loop import run_live
 from gateway.runtime.setup import Place, Setup
+from gateway.runtime.udp import UdpLink
 from gateway.runtime.urls import Url
 from gateway.settings import DEMO_SITE, format_site
 

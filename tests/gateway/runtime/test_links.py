@@ -8,10 +8,11 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from gateway.runtime import links as links_module
+from gateway.runtime import udp as udp_module
 from gateway.runtime.batches import batches_of
-from gateway.runtime.links import Link, UdpLink, open_link
+from gateway.runtime.links import Link, open_link
 from gateway.runtime.streams import SerialLink, TcpLink
+from gateway.runtime.udp import UdpLink
 from gateway.runtime.urls import LinkError, Url, parse_url
 
 linux_only = pytest.mark.skipif(
@@ -24,7 +25,7 @@ posix_only = pytest.mark.skipif(os.name != "posix", reason="Pseudo-terminals, wh
 def link(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[UdpLink]:
     """A listening link, with the batch call where the system has one, and as it is elsewhere."""
     if request.param == "one by one":
-        monkeypatch.setattr(links_module, "batches_of", lambda receiving: None)
+        monkeypatch.setattr(udp_module, "batches_of", lambda receiving: None)
     opened = UdpLink(Url("udpin", "127.0.0.1", 0))
     yield opened
     opened.close()
