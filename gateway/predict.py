@@ -1,4 +1,4 @@
-"""Predict: where it will be, and how sure that is. For now at constant velocity.
+"""Predict: where it will be, and how sure that is. At constant velocity, or, where the estimator has modes, in the likeliest one.
 
 Predictions are made at whole multiples of their period, for every track at once.
 """
@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.align import SECOND
-from gateway.estimators.kalman import POSITION, Estimate, predict
+from gateway.estimators.kalman import POSITION
 from gateway.frames import RunwayFrame, turn
 from gateway.fuse import Lane, knows_height
+from gateway.fuse.filtering import carried_on
 from gateway.fuse.weighting import Model
 
 Floats = NDArray[np.float64]
@@ -59,12 +60,9 @@ def forecast(lanes: Sequence[Lane], at: int, horizons_s: tuple[float, ...], mode
     n, h = len(lanes), len(horizons_s)
     covariance = np.array([lane.last.covariance for lane in lanes]).reshape(n, 9, 9)
     has_height = knows_height([lane.last for lane in lanes], [at] * n, covariance)
-    state = Estimate(
-        np.repeat(np.array([lane.last.mean for lane in lanes]).reshape(n, -1), h, axis=0),
-        np.repeat(covariance, h, axis=0),
-    )
     since_s = np.array([max(at - lane.last.at, 0) / SECOND for lane in lanes])
-    ahead = predict(state, (since_s[:, None] + np.array(horizons_s)).reshape(-1), model.motion)
+    events = [lane.last for lane in lanes for _ in horizons_s]
+    ahead, _ = carried_on(events, (since_s[:, None] + np.array(horizons_s)).reshape(-1), model, far=True)
     variance = 0.5 * (ahead.covariance[:, 0, 0] + ahead.covariance[:, 1, 1])
     tracks = tuple(lane.track for lane in lanes)
     mean = ahead.mean[:, POSITION].reshape(n, h, 3)

@@ -20,6 +20,7 @@ residual of exactly 0 would throw out the mode that fits exactly; `literal` boun
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -37,17 +38,21 @@ Rule = Literal["imm", "rmimm", "literal"]
 GRAVITY_MPS2 = 9.80665
 LEAST_SPEED_MPS = 5.0  # below it a bank says nothing of the turn rate
 LEAST_WEIGHT = 1e-6  # of a mode: none is ever impossible
-START_TURNING = 0.1  # what appears is seldom in a turn
+MEAN_PERIOD_S = 1.0  # the paper's period: in this time the mean counts once, however often it is measured
 WINDOW = 5  # residuals that `literal` takes the mean of
 LEAST_RESIDUAL_M = 1e-3  # `literal` is singular at 0
 
 
 @dataclass(frozen=True, slots=True)
 class Mode:
-    """One way of moving. `turn` is a multiple of the set's turn rate: 0 is straight, positive to the left."""
+    """One way of moving. `turn` is a multiple of the set's turn rate: 0 is straight, positive to the left.
+
+    `share` is how much of its time an aircraft spends so, against the other modes'.
+    """
 
     turn: float
     motion: Motion
+    share: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +65,10 @@ class Modes:
 
     modes: tuple[Mode, ...]
     rule: Rule = "rmimm"
-    stays_s: float = 33.0  # mean time in a mode; then all others are as likely
+    lasts_s: float = 22.0  # mean time until the mode is drawn anew; of three equal ones, each is left after 33 s
     turn_rate_rps: float = math.radians(3.0)
     bank_rad: float = math.radians(30.0)
-    fade: float = 0.92  # of the residuals' mean, an update
+    fade: float = 0.92  # of the residuals' mean, over MEAN_PERIOD_S
 
     @property
     def count(self) -> int:
@@ -76,17 +81,25 @@ class Modes:
         turns = np.array([mode.turn for mode in self.modes])
         return np.asarray(np.maximum(banked, self.turn_rate_rps)[:, None] * turns)
 
+    def directions(self, weight: Floats) -> Floats:
+        """Probabilities (n, 3) of flying straight, turning left, turning right, from the modes' weights (n, m)."""
+        sides = np.sign([mode.turn for mode in self.modes])
+        return np.stack([(weight * (sides == side)).sum(axis=1) for side in (0.0, 1.0, -1.0)], axis=1)
+
     def transition(self, elapsed_s: Floats) -> Floats:
         """Probabilities (n, m, m) of being in mode j after times (n,), having been in mode i.
 
-        Modes are left at a constant rate, so that two short times equal one long one.
+        At a constant rate the mode is drawn anew, by the modes' shares, so that two short times equal one long one.
         Source: 000 2.1.2, p_ij. Deviation: of the time since the last update, never of a fixed period.
         """
-        m = self.count
-        if m == 1:
-            return np.ones((len(elapsed_s), 1, 1))
-        other = -np.expm1(elapsed_s * (-m / ((m - 1) * self.stays_s))) / m
-        return np.asarray(np.eye(m) + other[:, None, None] * (np.ones((m, m)) - m * np.eye(m)))
+        keep = np.exp(elapsed_s / -self.lasts_s)[:, None, None]
+        return np.asarray(keep * np.eye(self.count) + (1.0 - keep) * self.shares)
+
+    @property
+    def shares(self) -> Floats:
+        """How much of its time an aircraft spends in each mode, (m,), in all 1."""
+        shares = np.array([mode.share for mode in self.modes])
+        return np.asarray(shares / shares.sum())
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,10 +116,39 @@ class Mixture:
     score: Floats
     information: Floats
     recent: Floats
+    elapsed_s: Floats  # (n,) since the last measurement
 
     def each(self) -> Estimate:
         """The modes' states as n m rows, those of one track together."""
         return Estimate(self.mean.reshape(-1, SIZE), self.covariance.reshape(-1, SIZE, SIZE))
+
+    def row(self, place: int) -> Mixture:
+        """One of the tracks, as a mixture of one."""
+        one = slice(place, place + 1)
+        return Mixture(
+            self.mean[one],
+            self.covariance[one],
+            self.weight[one],
+            self.score[one],
+            self.information[one],
+            self.recent[one],
+            self.elapsed_s[one],
+        )
+
+
+def stacked(rows: Sequence[Mixture]) -> Mixture:
+    """Mixtures of some tracks as one."""
+    if len(rows) == 1:
+        return rows[0]
+    return Mixture(
+        np.concatenate([row.mean for row in rows]),
+        np.concatenate([row.covariance for row in rows]),
+        np.concatenate([row.weight for row in rows]),
+        np.concatenate([row.score for row in rows]),
+        np.concatenate([row.information for row in rows]),
+        np.concatenate([row.recent for row in rows]),
+        np.concatenate([row.elapsed_s for row in rows]),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,18 +194,16 @@ class Told:
 
 
 def begin(state: Estimate, modes: Modes) -> Mixture:
-    """Mixtures of n tracks that were just started, most likely straight."""
+    """Mixtures of n tracks that were just started: the modes in their shares."""
     n, m = len(state.mean), modes.count
-    turning = np.array([mode.turn != 0.0 for mode in modes.modes])
-    share = np.where(turning, START_TURNING / max(turning.sum(), 1), 1.0)
-    share[~turning] = (1.0 - share[turning].sum()) / max((~turning).sum(), 1)
     return Mixture(
         np.repeat(state.mean[:, None], m, axis=1),
         np.repeat(state.covariance[:, None], m, axis=1),
-        np.repeat((share / share.sum())[None], n, axis=0),
+        np.repeat(modes.shares[None], n, axis=0),
         np.zeros((n, m, 3)),
         np.zeros((n, m, 3, 3)),
         np.full((n, m, WINDOW if modes.rule == "literal" else 0, 3), math.nan),
+        np.zeros(n),
     )
 
 
@@ -191,7 +231,18 @@ def predict(mixture: Mixture, elapsed_s: Floats, modes: Modes, transition: Float
     mean = (carry @ mean[..., None])[..., 0]
     covariance = carry @ covariance @ carry.swapaxes(-1, -2) + noise
     covariance = 0.5 * (covariance + covariance.swapaxes(-1, -2))
-    return Mixture(mean, covariance, weight, mixture.score, mixture.information, mixture.recent)
+    passed_s = mixture.elapsed_s + elapsed_s
+    return Mixture(mean, covariance, weight, mixture.score, mixture.information, mixture.recent, passed_s)
+
+
+def held(mixture: Mixture, elapsed_s: Floats, modes: Modes) -> Estimate:
+    """The states `elapsed_s` (n,) later if each track goes on in the mode that is likeliest now.
+
+    A look far ahead is not an average of turning round to the left and to the right.
+    """
+    ahead = predict(mixture, elapsed_s, modes, np.eye(modes.count)[None])
+    rows, likeliest = np.arange(len(elapsed_s)), mixture.weight.argmax(axis=1)
+    return Estimate(ahead.mean[rows, likeliest], ahead.covariance[rows, likeliest])
 
 
 def _matched(share: Floats, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
@@ -230,8 +281,9 @@ def weigh(mixture: Mixture, after: Estimate, told: Innovation, modes: Modes) -> 
     score, information, recent = mixture.score, mixture.information, mixture.recent
     log = np.log(mixture.weight) + likelihood
     if modes.rule == "rmimm":
-        score, information = _faded(mixture, told, modes.fade)
-        log -= 0.5 * np.log1p(_excess(score, information))
+        score, information = _faded(mixture, told, modes.fade ** (mixture.elapsed_s / MEAN_PERIOD_S))
+        share = np.minimum(mixture.elapsed_s / MEAN_PERIOD_S, 1.0)
+        log -= (0.5 * share)[:, None] * np.log1p(_excess(score, information))
     elif modes.rule == "literal":
         recent = np.concatenate([recent[:, :, 1:], _in_metres(told).reshape(n, m, 1, 3)], axis=2)
         mean = np.where(np.isnan(recent), 0.0, recent).sum(axis=2) / np.maximum((~np.isnan(recent)).sum(axis=2), 1)
@@ -240,16 +292,18 @@ def weigh(mixture: Mixture, after: Estimate, told: Innovation, modes: Modes) -> 
     weight = np.maximum(weight / weight.sum(axis=1, keepdims=True), LEAST_WEIGHT)
     weight /= weight.sum(axis=1, keepdims=True)
     mean, covariance = after.mean.reshape(n, m, SIZE), after.covariance.reshape(n, m, SIZE, SIZE)
-    return Mixture(mean, covariance, weight, score, information, recent), Told(mixture.weight, told, likelihood)
+    mixture_after = Mixture(mean, covariance, weight, score, information, recent, np.zeros(n))
+    return mixture_after, Told(mixture.weight, told, likelihood)
 
 
-def _faded(mixture: Mixture, told: Innovation, fade: float) -> tuple[Floats, Floats]:
+def _faded(mixture: Mixture, told: Innovation, left: Floats) -> tuple[Floats, Floats]:
     """Score and information after an update: h' S^-1 y, h' S^-1 h by the position, added to what is left of the old."""
     sensitivity = told.sensitivity[:, :, POSITION]
     by_position = sensitivity.transpose(0, 2, 1) @ told.inverse
     score = (by_position @ told.innovation[:, :, None]).reshape(mixture.score.shape)
     information = (by_position @ sensitivity).reshape(mixture.information.shape)
-    return fade * mixture.score + score, fade * fade * mixture.information + information
+    faded = left[:, None, None]
+    return faded * mixture.score + score, (faded * faded)[..., None] * mixture.information + information
 
 
 def _excess(score: Floats, information: Floats) -> Floats:

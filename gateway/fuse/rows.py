@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix
 from gateway.associate import Span
-from gateway.estimators.kalman import ERROR, POSITION, SIZE, VELOCITY, Estimate, predict
+from gateway.estimators.kalman import ERROR, POSITION, SIZE, VELOCITY
 from gateway.frames import RunwayFrame, turn
-from gateway.fuse.filtering import NEVER, Event, Job, run
+from gateway.fuse.filtering import NEVER, Event, Job, carried_on, directions, run
 from gateway.fuse.lanes import Ended, Lane, Lanes, radar_names
 from gateway.fuse.weighting import Model
 
@@ -67,9 +67,10 @@ class Row:
     covariance: Floats  # (9, 9)
     separation_m: float  # of the geoid, as it was known then
     event: Event  # what the row was made of
+    modes: Floats  # (3,) straight, left, right; NaN = the estimator has none
 
 
-def row_of(lane: Lane, event: Event, spans: Sequence[Span], separation_m: float) -> Row:
+def row_of(lane: Lane, event: Event, spans: Sequence[Span], separation_m: float, model: Model) -> Row:
     """The row that an event of a lane writes."""
     by = "gps" if isinstance(event.measure, Fix) else "radar"
     within = int(SEEN_WITHIN_S * SECOND)
@@ -89,6 +90,7 @@ def row_of(lane: Lane, event: Event, spans: Sequence[Span], separation_m: float)
         event.covariance,
         separation_m,
         event,
+        directions(event, model),
     )
 
 
@@ -102,7 +104,7 @@ def work(
     for job, events in zip(jobs, run(jobs, model), strict=True):
         lane = lanes.lanes[job.track]
         changed[lane.track] = lane.with_events((*lane.events, *events))
-        rows += [row_of(lane, event, spans, separation_m) for event in events]
+        rows += [row_of(lane, event, spans, separation_m, model) for event in events]
         outliers += sum(event.outlying and event.measure.serial == job.fresh for event in events)
     return lanes.with_lanes(changed), rows, outliers
 
@@ -111,10 +113,8 @@ def coast(lanes: Sequence[Lane], at: int, spans: Sequence[Span], separation_m: f
     """A row for each of some silent lanes, carried on to an instant."""
     if not lanes:
         return []
-    mean = np.array([lane.last.mean for lane in lanes])
-    covariance = np.array([lane.last.covariance for lane in lanes])
     elapsed_s = np.array([(at - lane.last.at) / SECOND for lane in lanes])
-    state = predict(Estimate(mean, covariance), elapsed_s, model.motion)
+    state, flown = carried_on([lane.last for lane in lanes], elapsed_s, model)
     return [
         Row(
             at,
@@ -128,6 +128,7 @@ def coast(lanes: Sequence[Lane], at: int, spans: Sequence[Span], separation_m: f
             state.covariance[i],
             separation_m,
             lane.last,
+            flown[i],
         )
         for i, lane in enumerate(lanes)
     ]
@@ -178,7 +179,7 @@ def table(rows: Sequence[Row], ended: Sequence[Ended], frame: RunwayFrame, model
         altitude_msl_m=height - np.array([row.separation_m for row in rows]).reshape(n),
         velocity_mps=velocity,
         covariance=covariance.reshape(n, 36),
-        modes=np.full((n, 3), math.nan),
+        modes=np.array([row.modes for row in rows]).reshape(n, 3),
         runway_m=turn(frame.runway_from_enu, position),
         bias_m=np.where(known & has_error, mean[:, ERROR], math.nan),
         pressure_altitude_m=np.array([_pressure_altitude_m(row) for row in rows]).reshape(n),

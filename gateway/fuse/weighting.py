@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gateway.align import Local
 from gateway.estimators.kalman import ERROR, POSITION, SIZE, VELOCITY, Estimate, Innovation, Motion, start, update
+from gateway.estimators.modes import Mode, Modes
 from gateway.frames import RadarFrame, polar_from_xyz, polar_jacobian, xyz_from_polar
 from gateway.settings import Options, PositionSource, Weighting
 
@@ -27,6 +28,9 @@ START_SPEED_SIGMA_MPS = 100.0  # before anything is known of a velocity
 WINDOW = 8  # innovations remembered by `innovation`
 LEAST_RESIDUAL = 1e-3  # sigmas; the literal weights are singular at a residual of 0
 
+
+CALM_M2PS3 = (0.02, 0.02, 0.02)
+TURN_M2PS3 = (0.25, 0.25, 0.25)
 
 AXES = np.arange(3)
 
@@ -42,6 +46,7 @@ class Model:
     weighting: Weighting
     motion: Motion
     radars: Mapping[int, RadarFrame]
+    modes: Modes | None = None  # with them, states come as rows of `together` guesses at each track
 
     @classmethod
     def of(cls, options: Options, position: PositionSource, radars: Mapping[int, RadarFrame]) -> Model:
@@ -49,12 +54,26 @@ class Model:
         level = options.acceleration_sigma_mps2**2 * options.acceleration_time_s
         upright = options.vertical_acceleration_sigma_mps2**2 * options.acceleration_time_s
         error = position.systematic_m / math.sqrt(3.0) if options.weighting == "bias" else 0.0
-        return cls(options.weighting, Motion((level, level, upright), error), radars)
+        motion = Motion((level, level, upright), error)
+        return cls(options.weighting, motion, radars, modes_of(options, motion))
+
+    @property
+    def together(self) -> int:
+        """How many states of one track there are."""
+        return 1 if self.modes is None else self.modes.count
 
     @property
     def memory(self) -> int:
         """How many innovations each track remembers."""
         return WINDOW if self.weighting == "innovation" else 0
+
+
+def modes_of(options: Options, motion: Motion) -> Modes | None:
+    """The set of modes that the options ask for, or None for the one of `motion`."""
+    if options.estimator == "kalman":
+        return None
+    calm, turning = replace(motion, acceleration_density=CALM_M2PS3), replace(motion, acceleration_density=TURN_M2PS3)
+    return Modes((Mode(0.0, calm), Mode(0.0, motion), Mode(1.0, turning), Mode(-1.0, turning)), options.estimator)
 
 
 def start_from_fixes(
@@ -143,7 +162,7 @@ def _weighed(
         mean_square = square.sum(axis=1) / np.maximum((~np.isnan(known)).sum(axis=1), 1)
         variance[:, :3] = np.maximum(variance[:, :3], mean_square - state.covariance[:, AXES, AXES])
         memory = known[:, 1:]
-    after, told = update(state, innovation, sensitivity, variance, ROBUST_SIGMA)
+    after, told = update(state, innovation, sensitivity, variance, ROBUST_SIGMA, model.together)
     return after, told, memory
 
 
@@ -193,17 +212,25 @@ def _along(axes: Floats, vectors: Floats) -> Floats:
     return np.asarray((axes @ vectors[:, :, None])[:, :, 0])
 
 
-def update_with_plots(state: Estimate, polar: Floats, sigma: Floats, frame: RadarFrame) -> tuple[Estimate, Innovation]:
+def update_with_plots(
+    state: Estimate, polar: Floats, sigma: Floats, frame: RadarFrame, together: int = 1
+) -> tuple[Estimate, Innovation]:
     """States after plots of one radar: polar and sigma (n, 3), NaN components are left out. Source: 003 2.4 eq 17 to 20."""
     xyz = frame.from_enu(state.mean[:, POSITION])
     innovation = polar_difference(polar, polar_from_xyz(xyz))
     sensitivity = np.zeros((len(polar), 3, SIZE))
     sensitivity[:, :, POSITION] = polar_jacobian(xyz) @ frame.radar_from_enu
-    return update(state, innovation, sensitivity, sigma * sigma, ROBUST_SIGMA)
+    return update(state, innovation, sensitivity, sigma * sigma, ROBUST_SIGMA, together)
 
 
 def update_literally(
-    state: Estimate, position: Floats, position_sigma: Floats, polar: Floats, sigma: Floats, frame: RadarFrame
+    state: Estimate,
+    position: Floats,
+    position_sigma: Floats,
+    polar: Floats,
+    sigma: Floats,
+    frame: RadarFrame,
+    together: int = 1,
 ) -> tuple[Estimate, Innovation]:
     """States after GPS reports (n, 3) with the radar's plot at the same time, as printed.
 
@@ -226,7 +253,7 @@ def update_literally(
     variance = np.where(both, (weight_radar * radar_variance + weight_gps * gps_variance) / total, gps_variance)
     sensitivity = np.zeros((len(polar), 3, SIZE))
     sensitivity[:, :, POSITION] = jacobian
-    return update(state, fused, sensitivity, variance, ROBUST_SIGMA)
+    return update(state, fused, sensitivity, variance, ROBUST_SIGMA, together)
 
 
 def polar_difference(one: Floats, other: Floats) -> Floats:

@@ -124,10 +124,10 @@ def _cells(one: Reached) -> tuple[float, ...]:
 
 def modes(rule: Rule) -> Modes:
     """The paper's three modes; the same tuning for every rule."""
-    stays_s = -1.5 / math.log(1.5 * STAYS - 0.5)  # three modes kept with STAYS over a second
+    lasts_s = -1.0 / math.log(1.5 * STAYS - 0.5)  # three modes kept with STAYS over a second
     motions = [Motion((sigma**2, sigma**2, sigma**2), 0.0) for sigma in NOISE_MPS2]
     straight, left, right = Mode(0.0, motions[0]), Mode(1.0, motions[1]), Mode(-1.0, motions[1])
-    return Modes((straight, left, right), rule, stays_s, TURN_RPS)
+    return Modes((straight, left, right), rule, lasts_s, TURN_RPS)
 
 
 def flight(runs: int, seed: int, *, velocity: bool = False) -> Flight:

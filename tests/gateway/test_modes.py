@@ -99,10 +99,13 @@ def test_two_transitions_are_one(elapsed_s: float, share: float, count: int) -> 
     assert (whole >= 0.0).all()
 
 
-def test_a_mode_lasts_as_long_as_it_is_said_to() -> None:
-    """The rate at which a mode is left is one in `stays_s` seconds."""
-    chance = Modes(THREE, stays_s=33.0).transition(np.array([1e-4]))
+def test_a_mode_is_left_at_its_rate_and_shares_are_kept() -> None:
+    """Of three equal modes drawn anew after 22 s each is left after 33 s; at last the modes have their shares."""
+    chance = Modes(THREE, lasts_s=22.0).transition(np.array([1e-4]))
     assert (1.0 - chance[0].diagonal()) / 1e-4 == pytest.approx([1.0 / 33.0] * 3, rel=1e-4)
+    uneven = Modes((Mode(0.0, CALM, 3.0), Mode(1.0, HARD, 1.0)))
+    assert uneven.transition(np.array([1e4]))[0] == pytest.approx(np.array([[0.75, 0.25]] * 2))
+    assert uneven.shares @ uneven.transition(np.array([7.0]))[0] == pytest.approx([0.75, 0.25])
 
 
 def test_slow_aircraft_turn_faster() -> None:
@@ -251,6 +254,23 @@ def test_an_outlier_does_not_switch_modes(rule: Rule) -> None:
     assert mixture.weight[0, 0] > 0.9
     assert bounded.weight[0].argmax() == 0
     assert unbounded.weight[0].argmax() == 1
+
+
+def test_the_mean_counts_by_time_however_often_it_is_measured() -> None:
+    """Ten measurements at one instant let the residuals' mean count once, as a single one does; the likelihood counts each."""
+    modes, random = Modes(THREE), np.random.default_rng(4)
+    plain = Modes(THREE, "imm")
+    whole = predict(begin(_states(1), modes), np.ones(1), modes)
+    by_likelihood = whole
+    for _ in range(10):
+        place = whole.mean[:, 0, :3] + random.normal(size=(1, 3)) * 20.0
+        again = np.zeros(1)
+        whole = _step(whole, again, place, np.full((1, 3), 400.0), modes)
+        by_likelihood = _step(by_likelihood, again, place, np.full((1, 3), 400.0), plain)
+        assert whole.elapsed_s == 0.0
+    ratio = whole.weight[0] / by_likelihood.weight[0]
+    # one factor between 1 and (1 + chi-square of the first one)^(-1/2), not its tenth power
+    assert ratio.max() / ratio.min() < 2.0
 
 
 def test_a_mirrored_flight_swaps_left_and_right() -> None:
