@@ -48,6 +48,7 @@ def demo(
     viewer: take.ViewerOption = None,
     serve: take.ServeOption = None,
     seed: Annotated[int, typer.Option("--seed", metavar="N", help="Of the random numbers.")] = 0,
+    estimator: take.EstimatorOption = take.Estimator.kalman,
     weighting: take.WeightingOption = take.Weighting.bias,
     association: take.AssociationOption = take.Association.default,
     quiet: take.QuietOption = False,
@@ -73,7 +74,7 @@ def demo(
         text = format_site(world.site)
         setup = Setup(
             place=Place(parse_site(text), text, "demo"),
-            options=take.choose(weighting, association),
+            options=take.choose(weighting, association, estimator),
             archive=archive,
             serve=take.read_serve(serve, looks),
             live=True,

@@ -153,6 +153,7 @@ def live(
     archive: take.ArchiveOption = None,
     seconds: SecondsOption = None,
     plan: PlanOption = None,
+    estimator: take.EstimatorOption = take.Estimator.kalman,
     weighting: take.WeightingOption = take.Weighting.bias,
     association: take.AssociationOption = take.Association.default,
     key: take.KeyOption = None,
@@ -188,7 +189,7 @@ def live(
     signing_key = take.read_signing_key(key)
     setup = Setup(
         place=place,
-        options=take.choose(weighting, association),
+        options=take.choose(weighting, association, estimator),
         archive=archive,
         serve=take.read_serve(serve, looks),
         publish=take.read_urls([publish], MAVLINK_PORT)[0] if publish else None,

@@ -24,6 +24,14 @@ class Viewer(StrEnum):
     none = "none"
 
 
+class Estimator(StrEnum):
+    """How aircraft are taken to move."""
+
+    kalman = "kalman"
+    imm = "imm"
+    rmimm = "rmimm"
+
+
 class Weighting(StrEnum):
     """How GPS and radar are weighed against each other."""
 
@@ -70,6 +78,12 @@ ArchiveOption = Annotated[
     Path | None,
     typer.Option(
         "--archive", metavar="DIR", help="Keep the session: a folder of its own inside DIR.", show_default=False
+    ),
+]
+EstimatorOption = Annotated[
+    Estimator,
+    typer.Option(
+        "--estimator", help="How tracks move: kalman at constant velocity; imm and rmimm tell straight and turns apart."
     ),
 ]
 WeightingOption = Annotated[
@@ -152,11 +166,11 @@ def read_urls(texts: list[str], default_port: int) -> list[Url]:
         raise UsageError(str(error)) from error
 
 
-def choose(weighting: Weighting, association: Association) -> Options:
+def choose(weighting: Weighting, association: Association, estimator: Estimator = Estimator.kalman) -> Options:
     """The options of a run."""
     from gateway.settings import Options
 
-    return Options(weighting=weighting.value, association=association.value)
+    return Options(estimator=estimator.value, weighting=weighting.value, association=association.value)
 
 
 def read_serve(text: str | None, viewer: Viewer) -> Serve | None:
@@ -173,7 +187,12 @@ def read_serve(text: str | None, viewer: Viewer) -> Serve | None:
     return Serve(host.strip("[]"), int(port))
 
 
-def change(options: Options, weighting: Weighting | None, association: Association | None) -> Options:
+def change(
+    options: Options,
+    weighting: Weighting | None,
+    association: Association | None,
+    estimator: Estimator | None = None,
+) -> Options:
     """The options with what was asked for in place of what was archived."""
     from dataclasses import replace
 
@@ -181,4 +200,6 @@ def change(options: Options, weighting: Weighting | None, association: Associati
         options = replace(options, weighting=weighting.value)
     if association is not None:
         options = replace(options, association=association.value)
+    if estimator is not None:
+        options = replace(options, estimator=estimator.value)
     return options

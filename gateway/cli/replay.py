@@ -84,6 +84,10 @@ PlanOption = Annotated[
         show_default=False,
     ),
 ]
+EstimatorOption = Annotated[
+    take.Estimator | None,
+    typer.Option("--estimator", help="How tracks move. (default: the session's, else kalman)", show_default=False),
+]
 WeightingOption = Annotated[
     take.Weighting | None,
     typer.Option(
@@ -162,6 +166,7 @@ def replay(
     viewer: take.ViewerOption = None,
     serve: take.ServeOption = None,
     archive: take.ArchiveOption = None,
+    estimator: EstimatorOption = None,
     weighting: WeightingOption = None,
     association: AssociationOption = None,
     key: take.KeyOption = None,
@@ -185,7 +190,7 @@ def replay(
     try:
         playback = open_playback(files, read_plans(plan))
         found = place or playback.place or playback.find_place()
-        options = take.change(playback.options, weighting, association)
+        options = take.change(playback.options, weighting, association, estimator)
         has_own_place = place is not None or playback.place is not None
         playback, options = seek(playback, options, begin, end, mute)
         setup = Setup(

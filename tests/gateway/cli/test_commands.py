@@ -46,6 +46,7 @@ def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
         (["replay"], "FILE"),
         (["replay", "x.tlog", "--speed", "fast"], "--speed 'fast'"),
         (["replay", "x.tlog", "--weighting", "heavy"], "heavy"),
+        (["replay", "x.tlog", "--estimator", "guess"], "guess"),
         (["play", "x.tlog", "--mavlink", "tcp:127.0.0.1:5760"], "needs udpout:HOST:PORT"),
         (["simulate", "circus"], "circus"),
         (["simulate", "radar"], "--watch"),
