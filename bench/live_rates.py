@@ -1,15 +1,18 @@
 """Live at high rates over UDP on loopback: what is lost, what is counted, what it costs.
 
-python -m bench.live_rates VEHICLES RATE SECONDS [default]      prints, as JSON, what one run gave
+python -m bench.live_rates VEHICLES RATE SECONDS [default] [alone]      prints, as JSON, what one run gave
 
 The whole gateway runs in a process of its own: links, receiver, decoder, pipeline, archive (`run_live`, as `talkdown
 live` calls it, without its display). The telemetry comes from another process (see `bench.fleet`). With `default` the
-receive buffer is the one that the system gives to everybody.
+receive buffer is the one that the system gives to everybody; a process of its own empties it then, unless `alone`. The
+CPU time of that process counts as the gateway's.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import statistics
 import subprocess
 import sys
@@ -61,13 +64,30 @@ def _run(vehicles: int, rate: int, seconds: int, *more: str) -> dict[str, Any]:
 
 
 class Meter:
-    """Watches a live run: the CPU time of this process, sampled, and the longest time between two steps."""
+    """Watches a live run: the CPU time of the gateway, sampled, and the longest time between two steps."""
 
-    def __init__(self) -> None:
+    def __init__(self, other: int | None) -> None:
+        """`other` is the process that empties the socket, if there is one."""
+        self._other = other
         self.shares: list[float] = []
         self.slowest_tick_s = 0.0
         self._since = self._tick = time.monotonic()
-        self.began_s = self._used = time.process_time()
+        self.other_s = 0.0
+        self._began_s = self._used = self.cpu_s
+
+    @property
+    def cpu_s(self) -> float:
+        """CPU time of both processes."""
+        if self._other is not None:
+            with contextlib.suppress(FileNotFoundError):  # it has ended: what it used until we last looked
+                words = Path(f"/proc/{self._other}/stat").read_text().rpartition(")")[2].split()
+                self.other_s = (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+        return time.process_time() + self.other_s
+
+    @property
+    def spent_s(self) -> float:
+        """CPU time since the beginning."""
+        return self.cpu_s - self._began_s
 
     def __call__(self, run: Run, picture: Picture | None) -> None:
         """After each step."""
@@ -75,12 +95,14 @@ class Meter:
         self.slowest_tick_s = max(self.slowest_tick_s, now - self._tick)
         self._tick = now
         if now - self._since >= _SAMPLE_S:
-            used = time.process_time()
+            used = self.cpu_s
             self.shares.append(100.0 * (used - self._used) / (now - self._since))
             self._since, self._used = now, used
 
 
-def measure(vehicles: int, rate: int, seconds: int, *, default_buffer: bool = False) -> dict[str, Any]:
+def measure(
+    vehicles: int, rate: int, seconds: int, *, default_buffer: bool = False, alone: bool = False
+) -> dict[str, Any]:
     """One run: the gateway in here, the telemetry of another process."""
     from gateway.runtime.links import RECEIVE_BUFFER_BYTES
     from gateway.runtime.loop import run_live
@@ -89,8 +111,12 @@ def measure(vehicles: int, rate: int, seconds: int, *, default_buffer: bool = Fa
     from gateway.runtime.urls import Url
     from gateway.settings import DEMO_SITE, format_site
 
-    link = UdpLink(Url("udpin", "127.0.0.1", 0), None if default_buffer else RECEIVE_BUFFER_BYTES)
-    meter = Meter()
+    link = UdpLink(
+        Url("udpin", "127.0.0.1", 0),
+        None if default_buffer else RECEIVE_BUFFER_BYTES,
+        is_drained=False if alone else None,
+    )
+    meter = Meter(link.drained_by)
     place = Place(DEMO_SITE, format_site(DEMO_SITE), "demo site")
     command = [sys.executable, "-m", "bench.fleet", *map(str, (link.url.port, vehicles, rate, seconds))]
     with tempfile.TemporaryDirectory() as folder:
@@ -98,7 +124,7 @@ def measure(vehicles: int, rate: int, seconds: int, *, default_buffer: bool = Fa
         with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment()) as sender:
             summary = run_live([link], [], setup, watch=meter, asked_to_stop=_Ended(sender))
             sent = json.loads(sender.stdout.read()) if sender.stdout else {}
-        cpu_s = time.process_time() - meter.began_s
+        cpu_s = meter.spent_s
         recorded = sum(_records(path) for path in Path(folder).glob("*/inputs/*.tlog"))
     decoded = sum(count for reason, count in summary.counters.items() if reason.endswith(" frames"))
     dropped = sum(count for reason, count in summary.counters.items() if "dropped by the kernel" in reason)
@@ -108,6 +134,7 @@ def measure(vehicles: int, rate: int, seconds: int, *, default_buffer: bool = Fa
         "latest_beat_s": sent["latest_beat_s"],
         "recorded": recorded,
         "decoded": decoded,
+        "other process cpu_s": meter.other_s,
         "cpu_us": 1e6 * cpu_s / max(decoded, 1),
         "dropped by the kernel": dropped,
         "queue overflow": overflow,
@@ -144,4 +171,5 @@ class _Ended:
 
 if __name__ == "__main__":
     _vehicles, _rate, _seconds = (int(word) for word in sys.argv[1:4])
-    print(json.dumps(measure(_vehicles, _rate, _seconds, default_buffer="default" in sys.argv[4:])))
+    _words = sys.argv[4:]
+    print(json.dumps(measure(_vehicles, _rate, _seconds, default_buffer="default" in _words, alone="alone" in _words)))

@@ -35,7 +35,7 @@ class Drain:
         """Start it, and wait until it is ready. Raises OSError where that cannot be."""
         number = receiving.fileno()
         self.is_finished = False
-        # A session of its own: Ctrl-C is told to all of ours.
+        # Not in a session of its own: Linux schedules sessions as groups, and measured, it then waits longer for its turn.
         self._child = subprocess.Popen(
             [sys.executable, "-I", "-S", str(_PROGRAM), str(number)],
             stdin=subprocess.PIPE,
@@ -43,7 +43,6 @@ class Drain:
             stderr=subprocess.DEVNULL,
             bufsize=0,
             pass_fds=(number,),
-            start_new_session=True,
         )
         assert self._child.stdin is not None
         assert self._child.stdout is not None
