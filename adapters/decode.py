@@ -18,9 +18,9 @@ What links lose (kernel drops, resynced bytes) is counted with the links.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import repeat
+from itertools import count
 from typing import Protocol
 
 from adapters import Arrival, Source, told
@@ -34,14 +34,15 @@ from adapters.meters import SECOND, SpeedMeter
 from adapters.radar import LandingRadarReceiver, observations
 from adapters.radar import Taken as TakenDatagram
 from adapters.signing import advice
+from adapters.unbroken import count_unbroken
+from adapters.vehicles import Component
 from adapters.wellbeing import vehicles_health
 from gateway.observation import FlightPlan, Heard, Observation, PlanPoint, Timing
 from gateway.picture import Health
 
 Observations = tuple[Observation, ...]
-Taken = tuple[Head, bytes | None]
-"""What a frame is, and its whole payload where the message says something."""
-_NOTHING_TAKEN: Taken = (NO_HEAD, None)
+Said = list[tuple[int, Heard]]
+"""What some of many arrivals said, each with its place among them."""
 
 
 class FrameGuard(Protocol):
@@ -109,35 +110,75 @@ class Decoder:
         """The session's time of a stamp, ns since 1970 UTC."""
         return self._epoch.session_time(received_at)
 
-    def taken(self, arrivals: Sequence[Arrival]) -> Iterable[Taken]:
-        """For each of many arrivals what `hear` is spared to find out; nothing where they are few, or it must look itself."""
-        if len(arrivals) < MANY or self._signing is not None:
-            return repeat(_NOTHING_TAKEN, len(arrivals))
-        return zip(*take([data for _, _, data, _ in arrivals], self._which), strict=True)
+    def hear_many(self, arrivals: Sequence[Arrival]) -> tuple[Said, list[int]]:
+        """The same as to hear each of them, in less time: what those said that said anything, and which were refused."""
+        if len(arrivals) >= MANY and self._signing is None:
+            return self._hear_together(arrivals)
+        said, refused = [], []
+        for place, arrival in enumerate(arrivals):
+            heard = self.hear(arrival)
+            if heard is not None:
+                said.append((place, heard))
+            if self.refused is not None:
+                refused.append(place)
+        return said, refused
 
-    def hear(self, arrival: Arrival, taken: Taken = _NOTHING_TAKEN) -> Heard | None:
+    def _hear_together(self, arrivals: Sequence[Arrival]) -> tuple[Said, list[int]]:
+        heads, payloads = take([data for _, _, data, _ in arrivals], self._which)
+        numbers = [number for _, number, _, _ in arrivals]
+        counted = count_unbroken(arrivals, numbers, heads, self._listened)
+        said, refused = [], []
+        for place, head, payload, component in zip(count(), heads, payloads, counted, strict=False):
+            if component is None:
+                heard = self.hear(arrivals[place], head, payload)
+                if self.refused is not None:
+                    refused.append(place)
+            elif payload is not None:
+                heard = self._hear_counted(arrivals[place], component, head >> 24, payload)
+            else:
+                continue
+            if heard is not None:
+                said.append((place, heard))
+        for number, place in dict(zip(numbers, count(), strict=False)).items():
+            self._listened[number].last_heard = arrivals[place].received_at
+        return said, refused
+
+    def _hear_counted(self, arrival: Arrival, component: Component, message: int, payload: bytes) -> Heard | None:
+        """What a good frame says that was counted with those around it."""
+        received_at, number, _, _ = arrival
+        listened = self._listened[number]
+        was_settled = self._epoch.offset_s is not None
+        found = self._mavlink.read(component, message, payload, received_at, listened.counters)
+        if self._plans or self._unclaimed:
+            found = self._with_plans(found, received_at)
+        return self._as_heard(found, listened, received_at, was_settled)
+
+    def hear(self, arrival: Arrival, head: Head = NO_HEAD, payload: bytes | None = None) -> Heard | None:
         """One MAVLink frame, radar datagram or told line; None where it observed nothing and there is nothing to say.
 
-        `taken`: of `taken`, where it told something. Raises KeyError for a source that was not added, and nothing else.
+        `head`, `payload`: what `take` has found, if anything. Raises KeyError for a source that was not added, and nothing
+        else.
         """
         received_at, number, data, _ = arrival
         listened = self._listened[number]
         listened.last_heard = received_at
         self.refused = None
-        kind, settled = listened.source.kind, self._epoch.offset_s is not None
+        kind, was_settled = listened.source.kind, self._epoch.offset_s is not None
         if kind == "mavlink":
             if self._signing is not None and not self._believes(arrival, listened):
                 return self._only_notes(received_at)
-            head, payload = taken
             if payload is None and listened.passes(data, head, self._wanted, received_at):
                 return self._only_notes(received_at) if self._notes else None
             frame = parse(data) if payload is None else frame_of(head, payload)
             found = self._hear_mavlink(arrival, frame, listened)
         else:
             found = self._hear_radar(arrival, listened) if kind == "radar" else self._hear_told(arrival, listened)
+        return self._as_heard(found, listened, received_at, was_settled)
+
+    def _as_heard(self, found: Observations, listened: Listened, received_at: int, was_settled: bool) -> Heard | None:
         if not found and not self._notes:
             return None
-        if not settled and self._epoch.offset_s:
+        if not was_settled and self._epoch.offset_s:
             # The session's time leaps with this arrival: why is said in the time before, and the leap comes with the next.
             listened.counters["clock settling"] += len(found)
             return Heard(received_at, (), self._say())

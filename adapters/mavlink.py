@@ -99,29 +99,36 @@ class MavlinkObserver:
         component.sequence.hear(frame.sequence, message, counters)
         if frame.verdict != "good":
             return ()
+        component.rates.hear(message, received_at)
+        return self.read(component, message, frame.payload, received_at, counters)
+
+    def read(
+        self, component: Component, message: int, payload: bytes, received_at: int, counters: Counter[str]
+    ) -> Observations:
+        """What a good frame of a component says, apart from its sequence number. Never raises."""
         if message in _ROLES:
-            component.take_role(*_ROLES[message](frame.payload)[:2])
+            component.take_role(*_ROLES[message](payload)[:2])
         if component.is_vehicle:
-            component.rates.hear(message, received_at)
             reader = _READERS.get(message)
             if reader is not None:
-                vehicle = self.registry.hear(component, frame, received_at, counters)
+                vehicle = self.registry.hear(component, message, payload, received_at, counters)
                 if vehicle is None:
                     return ()
-                return reader(self._moments, component, vehicle, frame.payload, received_at, counters)
+                return reader(self._moments, component, vehicle, payload, received_at, counters)
         if message in MISSION_MESSAGES:
-            return self._mission(component, frame, received_at)
+            return self._mission(component, message, payload, received_at)
         if message == traffic.ADSB_VEHICLE:
-            return self._traffic.hear_adsb(self._moments, frame.payload, received_at, counters)
+            return self._traffic.hear_adsb(self._moments, payload, received_at, counters)
         if message == drone_id.OPEN_DRONE_ID_LOCATION:
-            return self._drone_id(component, frame, received_at, counters)
+            return self._drone_id(component, payload, received_at, counters)
         return ()
 
-    def _mission(self, component: Component, frame: Frame, received_at: int) -> Observations:
+    def _mission(self, component: Component, message: int, payload: bytes, received_at: int) -> Observations:
         """Mission traffic: of the vehicle that tells its items, or of the one that a station tells them to."""
-        told = overheard(frame.message, frame.payload)
+        told = overheard(message, payload)
+        source, system, _ = component.key
         by_vehicle = component.is_vehicle
-        vehicle = self.registry.of_number(component.key[0], frame.system if by_vehicle else told.target_system)
+        vehicle = self.registry.of_number(source, system if by_vehicle else told.target_system)
         if not told.act or vehicle is None:
             return ()
         first_is_home = missions.begins_with_home(vehicle)
@@ -135,16 +142,17 @@ class MavlinkObserver:
             valid_at = self.epoch.session_time(received_at)
         return (FlightPlan(vehicle.name, valid_at, received_at, vehicle.plan.points()),)
 
-    def _drone_id(self, component: Component, frame: Frame, received_at: int, counters: Counter[str]) -> Observations:
+    def _drone_id(self, component: Component, payload: bytes, received_at: int, counters: Counter[str]) -> Observations:
         """Remote identification: of a drone that was heard, or of the sending system, whichever component sends it."""
-        name, payload = drone_id.identity(frame.payload), frame.payload
+        name = drone_id.identity(payload)
         if name:
             return drone_id.heard_location(self._moments, self._traffic, name, payload, received_at, counters)
         vehicle: Vehicle | None = None
         if not component.is_vehicle:
-            vehicle = self.registry.of_number(component.key[0], frame.system)
+            vehicle = self.registry.of_number(*component.key[:2])
         if vehicle is None:
-            vehicle = self.registry.hear(component, frame, received_at, counters)
+            message = drone_id.OPEN_DRONE_ID_LOCATION
+            vehicle = self.registry.hear(component, message, payload, received_at, counters)
         if vehicle is None:
             return ()
         return drone_id.own_location(self._moments, vehicle, payload, received_at, counters)

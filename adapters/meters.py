@@ -6,7 +6,8 @@ Each is bounded in memory and takes a frame in constant time.
 from __future__ import annotations
 
 import math
-from collections import deque
+from collections import Counter, deque
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 SECOND = 10**9
@@ -136,6 +137,12 @@ class Rates:
         if at >= self.until:
             self.turn(at)
         self.now[kind] = self.now.get(kind, 0) + 1
+
+    def hear_all(self, kinds: Iterable[int]) -> None:
+        """Count one message of each of these kinds, in the bucket that goes on."""
+        now = self.now
+        for kind, count in Counter(kinds).items():
+            now[kind] = now.get(kind, 0) + count
 
     def turn(self, at: int) -> None:
         """Begin the next bucket."""

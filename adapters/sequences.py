@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 _REORDERED = 56
@@ -75,6 +76,29 @@ class SequenceCheck:
             self.moved = True
         self.last, self.message = sequence, message
         self.messages[sequence] = message
+
+    def goes_on(self, first: int) -> bool:
+        """Whether this is the number after the last one, by a counter of its own."""
+        return self.joined is None and self.last >= 0 and (first - self.last) & 255 == 1
+
+    def run_on(self, first: int, messages: Sequence[int]) -> None:
+        """Take in messages whose numbers run on from `first`, which `goes_on`: the same as to hear each of them."""
+        count = len(messages)
+        shift = min(count, _REORDERED + 1)
+        self.recent = (self.recent << shift | (1 << shift) - 1) & _RECENT
+        self.missing = self.missing << shift & _RECENT
+        self.moved = True
+        self.last, self.message = (first + count - 1) & 255, messages[-1]
+        lately = messages[-256:]
+        at = (self.last + 1 - len(lately)) & 255
+        before_wrap, after_wrap = lately[: 256 - at], lately[256 - at :]
+        self.messages[at : at + len(before_wrap)] = before_wrap
+        self.messages[: len(after_wrap)] = after_wrap
+
+    def be_newest(self) -> None:
+        """Of its siblings this was heard last."""
+        if self.siblings is not None:
+            self.siblings.newest = self
 
     def _is_filled(self, sequence: int, ahead: int, message: int, counters: Counter[str]) -> bool:
         """Whether a gap is none, because a sibling used the numbers in it; counted as lost until that is sure."""

@@ -20,7 +20,6 @@ from struct import Struct
 from adapters.clock import SourceClock
 from adapters.fixes import Fixes
 from adapters.likeness import ATTITUDE, GLOBAL_POSITION_INT, Likeness, Trace
-from adapters.mavlink_frames import Frame
 from adapters.meters import Rates
 from adapters.plans import PlanBook
 from adapters.roles import ARDUPILOT as ARDUPILOT
@@ -64,9 +63,10 @@ class Vehicle:
     told: dict[tuple[int, int, bytes], int] = field(default_factory=dict)  # (component, message, time): its source
     tellers: dict[tuple[int, int], tuple[int, int]] = field(default_factory=dict)  # (component, message): source, stamp
 
-    def is_told(self, source: int, frame: Frame, size: int) -> bool:
-        """Whether another link has told what was so at this frame's time, its payload's first `size` bytes."""
-        key = (frame.component, frame.message, frame.payload[:size])
+    def is_told(self, component: Component, message: int, time: bytes) -> bool:
+        """Whether another link has told what this component's message says of this time, as its payload has it."""
+        source, _, number = component.key
+        key = (number, message, time)
         teller = self.told.setdefault(key, source)
         if len(self.told) > _TIMES:
             del self.told[next(iter(self.told))]
@@ -144,8 +144,10 @@ class Registry:
             return member.vehicle
         return next(iter(self._vehicles.get(system, ())), None)
 
-    def hear(self, component: Component, frame: Frame, received_at: int, counters: Counter[str]) -> Vehicle | None:
-        """The vehicle that a frame of a vehicle's component tells of; None where that is undecided, or was heard already."""
+    def hear(
+        self, component: Component, message: int, payload: bytes, received_at: int, counters: Counter[str]
+    ) -> Vehicle | None:
+        """The vehicle that a message of a vehicle's component tells of; None where that is undecided, or was heard already."""
         source, system, _ = component.key
         members = self._members.setdefault(system, {})
         member = members.get(source)
@@ -153,7 +155,7 @@ class Registry:
             member = members[source] = _Member(source, system)
             self._follow(members, received_at)
         if member.trace is not None:
-            self._compare(member, frame, received_at, counters)
+            self._compare(member, message, payload, received_at, counters)
         vehicle = member.vehicle
         if vehicle is None:
             vehicle = self._decide(member, received_at, counters)
@@ -168,7 +170,7 @@ class Registry:
                 counters["undecided"] += 1
                 return None  # what told them to be one was heard on the other link
         vehicle.last_heard = received_at
-        if len(vehicle.sources) > 1 and self._is_echo(component, vehicle, frame, received_at):
+        if len(vehicle.sources) > 1 and self._is_echo(component, vehicle, message, payload, received_at):
             counters["heard twice"] += 1
             return None
         return vehicle
@@ -185,19 +187,19 @@ class Registry:
             elif member.trace is None:
                 member.trace = Trace(received_at)
 
-    def _compare(self, member: _Member, frame: Frame, received_at: int, counters: Counter[str]) -> None:
-        """Take a frame in as evidence of who this is; two that have parted become two."""
+    def _compare(self, member: _Member, message: int, payload: bytes, received_at: int, counters: Counter[str]) -> None:
+        """Take a message in as evidence of who this is; two that have parted become two."""
         trace = member.trace
         assert trace is not None
-        if frame.message == SYSTEM_TIME:
-            unix_usec, boot_ms = _UTC.unpack(frame.payload[:12].ljust(12, b"\0"))
+        if message == SYSTEM_TIME:
+            unix_usec, boot_ms = _UTC.unpack(payload[:12].ljust(12, b"\0"))
             if unix_usec:
                 trace.hear_utc(unix_usec * 1000, boot_ms)
-        if frame.message not in (ATTITUDE, GLOBAL_POSITION_INT):
+        if message not in (ATTITUDE, GLOBAL_POSITION_INT):
             return
-        trace.hear(frame.message, frame.payload, received_at)
-        if frame.message == ATTITUDE or frame.payload[4:12].strip(b"\0"):  # positions of all zeros two would send alike
-            member.recent.append((frame.message, frame.payload))
+        trace.hear(message, payload, received_at)
+        if message == ATTITUDE or payload[4:12].strip(b"\0"):  # positions of all zeros two would send alike
+            member.recent.append((message, payload))
         vehicle = member.vehicle
         for source, likeness in member.likenesses.items():
             likeness.compare()
@@ -254,17 +256,17 @@ class Registry:
                 component.linked_to = None
         self._follow(self._members[member.system], 0)
 
-    def _is_echo(self, component: Component, vehicle: Vehicle, frame: Frame, received_at: int) -> bool:
-        """Whether what a frame of a vehicle over several links tells has been told over another, or is told better there."""
-        source = component.key[0]
+    def _is_echo(self, component: Component, vehicle: Vehicle, message: int, payload: bytes, received_at: int) -> bool:
+        """Whether what a message of a vehicle over several links tells has been told over another, or is told better there."""
+        source, _, number = component.key
         if component.linked_to is not vehicle:
             self._link(component, vehicle)
-        if frame.message == SYSTEM_TIME:
+        if message == SYSTEM_TIME:
             return False  # each link's clock is its own
-        size = _TIMED.get(frame.message)
+        size = _TIMED.get(message)
         if size is not None:
-            return vehicle.is_told(source, frame, size)
-        key = (frame.component, frame.message)
+            return vehicle.is_told(component, message, payload[:size])
+        key = (number, message)
         teller = vehicle.tellers.get(key)
         if teller is not None and teller[0] != source and received_at - teller[1] < _TELLS_NS:
             members = self._members[component.key[1]]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,7 @@ _WRITERS: dict[Kind, type[TlogWriter] | type[PcapWriter] | type[CommandsWriter]]
     "radar": PcapWriter,
     "told": CommandsWriter,
 }
+_SOURCE = itemgetter(1)  # of an Arrival
 
 
 class _File:
@@ -103,6 +106,11 @@ class Recorder:
     def keep(self, arrival: Arrival) -> None:
         """Record one arrival; it reaches the disk with the next flush."""
         self._pending[arrival.source].append(arrival)
+
+    def keep_all(self, arrivals: Iterable[Arrival]) -> None:
+        """Record many arrivals."""
+        for source, some in groupby(arrivals, _SOURCE):
+            self._pending[source] += some
 
     def refuse(self, arrival: Arrival) -> None:
         """Record a datagram that was refused, apart: it is never replayed."""

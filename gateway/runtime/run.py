@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import time
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -139,30 +140,40 @@ class Run:
 
     def _hear(self, arrivals: Sequence[Arrival]) -> list[Heard]:
         """Record and decode; what holds something for the picture."""
-        hear, counted, recorder = self._decoder.hear, self._arrivals, self._recorder
-        publishing = self.outputs if self.outputs is not None and self.outputs.publishes_on else None
         if self._first_at is None and arrivals:
             self._first_at = arrivals[0].received_at
-        heard: list[Heard] = []
-        for arrival, taken in zip(arrivals, self._decoder.taken(arrivals), strict=True):
-            if self._opening is not None and arrival.received_at >= self._opening.begins_at:
-                heard = self._open(heard, self._opening)
-            counted[arrival.source] += 1
-            if publishing is not None and publishing.is_our_own(arrival.data):
-                if recorder is not None:
-                    recorder.refuse(arrival)
-                continue
-            decoded = hear(arrival, taken)
-            if recorder is not None:
-                if self._decoder.refused is None:
-                    recorder.keep(arrival)
-                else:
-                    recorder.refuse(arrival)
-            if decoded is not None and self.setup.options.mutes:
-                decoded = self._muting.without_muted(decoded, arrival.received_at)
-            if decoded is not None:
-                heard.append(decoded)
-        return heard
+        if (opening := self._opening) is not None:
+            begins = (place for place, one in enumerate(arrivals) if one.received_at >= opening.begins_at)
+            if (at := next(begins, None)) is not None:
+                return [*self._open(self._decode(arrivals[:at]), opening), *self._decode(arrivals[at:])]
+        return self._decode(arrivals)
+
+    def _decode(self, arrivals: Sequence[Arrival]) -> list[Heard]:
+        for source, number in Counter(arrival[1] for arrival in arrivals).items():
+            self._arrivals[source] += number
+        if self.outputs is not None and self.outputs.publishes_on:
+            arrivals = self._without_our_own(arrivals, self.outputs)
+        said, refused = self._decoder.hear_many(arrivals)
+        if self._recorder is not None:
+            for place in refused:
+                self._recorder.refuse(arrivals[place])
+            apart = set(refused)
+            kept = [one for place, one in enumerate(arrivals) if place not in apart] if apart else arrivals
+            self._recorder.keep_all(kept)
+        if not self.setup.options.mutes:
+            return [heard for _, heard in said]
+        left = (self._muting.without_muted(heard, arrivals[place].received_at) for place, heard in said)
+        return [heard for heard in left if heard is not None]
+
+    def _without_our_own(self, arrivals: Sequence[Arrival], outputs: Outputs) -> list[Arrival]:
+        """What came in, but for what we published ourselves and somebody passed on."""
+        others = []
+        for arrival in arrivals:
+            if not outputs.is_our_own(arrival.data):
+                others.append(arrival)
+            elif self._recorder is not None:
+                self._recorder.refuse(arrival)
+        return others
 
     def _before(self, heard: list[Heard], opening: Opening) -> list[Heard]:
         """Nothing has come yet from the session's beginning on: keep what will hold then, unless time has come to it."""

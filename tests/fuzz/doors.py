@@ -137,8 +137,7 @@ class Live:
         """Many at once as a run does it, or with `one_by_one` each by itself."""
         if self.one_by_one:
             return [found for arrival in arrivals if (found := self.decoder.hear(arrival)) is not None]
-        together = zip(arrivals, self.decoder.taken(arrivals), strict=True)
-        return [found for arrival, taken in together if (found := self.decoder.hear(arrival, taken)) is not None]
+        return [found for _, found in self.decoder.hear_many(arrivals)[0]]
 
     def _work(self, heard: list[Heard]) -> None:
         watermark = self.decoder.watermark(self.now)

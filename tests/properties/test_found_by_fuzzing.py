@@ -279,7 +279,6 @@ def test_a_radars_stub_of_a_datagram_behind_many_frames_is_refused_as_any_other(
     arrivals = [Arrival(T0 + place * 4000, 0, frame) for place, frame in enumerate(frames)]
     arrivals.append(Arrival(T0 + SECOND, 1, last))
     decoder = Decoder([Source(0, "mavlink", "mavlink-1", "here"), Source(1, "radar", "radar-1", "there")])
-    for arrival, taken in zip(arrivals, decoder.taken(arrivals), strict=True):
-        decoder.hear(arrival, taken)
+    assert decoder.hear_many(arrivals)[1] == [150]
     assert decoder.counters()["mavlink-1 frames"] == 150
     assert decoder.counters()["radar-1 length"] == 1

@@ -1,0 +1,91 @@
+"""Frames that come without a gap, counted many at once: by far the most of what comes in thick.
+
+Where the sequence numbers of all components of a system run on by one, nothing was lost, doubled or late. All that one by
+one would find out then is the last number, and how many frames there were of each message.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from adapters import Arrival
+from adapters.frame_batches import NO_HEAD, Head
+from adapters.listening import Listened
+from adapters.vehicles import Component
+
+
+class _Sent(NamedTuple):
+    """What one component sent in a batch: its frames' places, their messages, and whether their numbers run on."""
+
+    source: int
+    system: int
+    component: Component | None
+    places: list[int]
+    messages: list[int]
+    first: int
+    runs_on: bool
+
+    def is_unbroken(self, arrivals: Sequence[Arrival]) -> bool:
+        """Whether all of it can be counted at once."""
+        component = self.component
+        return (
+            component is not None
+            and self.runs_on
+            and component.sequence.goes_on(self.first)
+            and arrivals[self.places[-1]].received_at < component.rates.until
+        )
+
+
+def count_unbroken(
+    arrivals: Sequence[Arrival], numbers: Sequence[int], heads: Sequence[Head], listened: Mapping[int, Listened]
+) -> list[Component | None]:
+    """Count the frames of all systems whose numbers run on; the component of each frame that was counted, else None.
+
+    `numbers`, `heads`: the source and the head of each arrival, in the order of their stamps. Left alone are whole sources
+    of which anything has no head, and whole systems with a gap, a new component, components that share a counter, or rates
+    that are due.
+    """
+    sent = list(_by_component(numbers, heads, listened))
+    broken = {number for number, head in zip(numbers, heads, strict=True) if head == NO_HEAD}
+    uneven = {(one.source, one.system) for one in sent if not one.is_unbroken(arrivals)}
+    counted: list[Component | None] = [None] * len(arrivals)
+    newest: dict[tuple[int, int], tuple[int, Component]] = {}
+    for one in sent:
+        component, key = one.component, (one.source, one.system)
+        if component is None or one.source in broken or key in uneven:
+            continue
+        component.sequence.run_on(one.first, one.messages)
+        component.rates.hear_all(one.messages)
+        heard = listened[one.source]
+        heard.counters["frames"] += len(one.messages)
+        heard.known_good.update(one.messages)
+        for place in one.places:
+            counted[place] = component
+        if key not in newest or newest[key][0] < one.places[-1]:
+            newest[key] = one.places[-1], component
+    for _, component in newest.values():
+        component.sequence.be_newest()
+    return counted
+
+
+def _by_component(numbers: Sequence[int], heads: Sequence[Head], listened: Mapping[int, Listened]) -> Iterator[_Sent]:
+    head = np.array(heads, np.int64)
+    senders = np.array(numbers, np.int64) << 16 | head >> 8 & 0xFFFF
+    order = np.argsort(senders, kind="stable")
+    senders, head = senders[order], head[order]
+    sequence = head & 255
+    is_first = np.diff(senders, prepend=-1) != 0
+    begins = np.flatnonzero(is_first)
+    runs_on = np.logical_and.reduceat(is_first | (np.diff(sequence, prepend=0) & 255 == 1), begins).tolist()
+    places, messages = order.tolist(), (head >> 24).tolist()
+    bounds = pairwise((*begins.tolist(), len(places)))
+    for sender, (begin, end), first, runs in zip(
+        senders[begins].tolist(), bounds, sequence[begins].tolist(), runs_on, strict=True
+    ):
+        number = sender >> 16
+        component = listened[number].components.get(sender & 0xFFFF)
+        yield _Sent(number, sender & 255, component, places[begin:end], messages[begin:end], first, runs)
