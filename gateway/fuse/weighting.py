@@ -29,8 +29,11 @@ WINDOW = 8  # innovations remembered by `innovation`
 LEAST_RESIDUAL = 1e-3  # sigmas; the literal weights are singular at a residual of 0
 
 
-CALM_M2PS3 = (0.02, 0.02, 0.02)
-TURN_M2PS3 = (0.25, 0.25, 0.25)
+# Of the modes: what an aircraft that does nothing is shaken by, and one in a turn (0.5 m/s2 over a second).
+CALM_M2PS3, TURNING_M2PS3 = (0.0225,) * 3, (0.25,) * 3
+MANOEUVRE_SHARE = 0.5  # of the one model's density: turns are modes of their own
+CALM_TIME, MANOEUVRE_TIME, TURN_TIME = 6.0, 2.0, 1.0  # how much of its time an aircraft flies so, against each other
+MODE_LASTS_S = 6.0
 
 AXES = np.arange(3)
 
@@ -69,11 +72,25 @@ class Model:
 
 
 def modes_of(options: Options, motion: Motion) -> Modes | None:
-    """The set of modes that the options ask for, or None for the one of `motion`."""
+    """The set of modes that the options ask for, or None for the one of `motion`.
+
+    Straight flight comes in two: calm, in which noise is taken off best, and with changes of speed, climb or course that are
+    no full turn.
+    """
     if options.estimator == "kalman":
         return None
-    calm, turning = replace(motion, acceleration_density=CALM_M2PS3), replace(motion, acceleration_density=TURN_M2PS3)
-    return Modes((Mode(0.0, calm), Mode(0.0, motion), Mode(1.0, turning), Mode(-1.0, turning)), options.estimator)
+    east, north, up = motion.acceleration_density
+    straying = (MANOEUVRE_SHARE * east, MANOEUVRE_SHARE * north, MANOEUVRE_SHARE * up)
+    calm, manoeuvring, turning = (
+        replace(motion, acceleration_density=density) for density in (CALM_M2PS3, straying, TURNING_M2PS3)
+    )
+    ways = (
+        Mode(0.0, calm, CALM_TIME),
+        Mode(0.0, manoeuvring, MANOEUVRE_TIME),
+        Mode(1.0, turning, TURN_TIME),
+        Mode(-1.0, turning, TURN_TIME),
+    )
+    return Modes(ways, options.estimator, MODE_LASTS_S)
 
 
 def start_from_fixes(

@@ -22,7 +22,7 @@ from gateway.fuse.filtering import Event, Job, Near, Neighbour, rank
 from gateway.fuse.filtering import run as run_filter
 from gateway.fuse.placing import begin
 from gateway.fuse.weighting import Model
-from gateway.settings import Options, Weighting
+from gateway.settings import EstimatorName, Options, Weighting
 from gateway.track import Key, Place, RadarTracks
 from sim.cases import Case, case_003
 from sim.sensors import PlotsMeasured
@@ -103,10 +103,10 @@ def measures_of(case: Case, index: int) -> Measures:
     return Measures(fixes, _plots(case, case.plots, index, TARGET[1]), beside)
 
 
-def measure_accuracy(case: Case, method: str) -> Accuracy:
+def measure_accuracy(case: Case, method: str, estimator: EstimatorName = "kalman") -> Accuracy:
     """RMSE of one method over all runs of a case; a method is a weighting, "radar alone" or "GPS alone"."""
     weighting: Weighting = method if method in WEIGHTINGS else "covariance"
-    options = Options(weighting=weighting)
+    options = Options(estimator=estimator, weighting=weighting)
     frame = RunwayFrame(case.site.runway)
     radars = {radar.number: RadarFrame.of(radar, frame) for radar in case.site.radars}
     model = Model.of(options, case.site.position, radars)
