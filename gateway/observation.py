@@ -6,8 +6,35 @@ Every observation has `valid_at` (when it was so, by its source's clock) and `re
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, make_dataclass
 from enum import Enum
+from typing import Any, TypeVar, cast
+
+_Made = TypeVar("_Made")
+
+
+def made_swiftly(made: type[_Made]) -> type[_Made]:
+    """A frozen dataclass with slots whose instances are made in a third of the time: tens of thousands a second are.
+
+    The `__init__` of a frozen dataclass writes past its own guard, field by field. This one lets the new instance be of a
+    class with the same slots and no guard until its fields are written.
+    """
+    names = [(one.name, Any) for one in fields(cast(Any, made))]
+    draft = make_dataclass(made.__name__, names, slots=True)
+    defaults = made.__init__.__defaults__ or ()
+    first = len(names) - len(defaults)
+    said = [name if place < first else f"{name}=_defaults[{place - first}]" for place, (name, _) in enumerate(names)]
+    lines = [
+        "_become(self, '__class__', _draft)",
+        *(f"self.{name} = {name}" for name, _ in names),
+        "self.__class__ = _made",
+    ]
+    scope: dict[str, Any] = {"_become": object.__setattr__, "_draft": draft, "_made": made, "_defaults": defaults}
+    exec(f"def __init__(self, {', '.join(said)}):\n    " + "\n    ".join(lines), scope)
+    scope["__init__"].__annotations__ = made.__init__.__annotations__
+    scope["__init__"].__qualname__ = made.__init__.__qualname__
+    type.__setattr__(made, "__init__", scope["__init__"])
+    return made
 
 
 class Timing(Enum):
@@ -19,6 +46,7 @@ class Timing(Enum):
     FOREIGN = "foreign"  # more than 5 s from the session's time: shown, not fused, named
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class GpsReport:
     """A position that an aircraft reported of itself.
@@ -50,6 +78,7 @@ class GpsReport:
     callsign: str | None = None
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class RadarPlot:
     """One detection of a radar, in its own frame; any component may be missing. Track number 0: not tracked by the radar."""
@@ -70,6 +99,7 @@ class RadarPlot:
     timing: Timing = Timing.UTC
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class RadarStatus:
     """What a radar says of itself."""
@@ -86,6 +116,7 @@ class RadarStatus:
     compass_boresight_rad: float
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class Attitude:
     """Roll, pitch, yaw (yaw clockwise from true north; pitch nose up; roll right wing down)."""
@@ -98,6 +129,7 @@ class Attitude:
     yaw_rad: float
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class ImuSample:
     """One sample of an inertial unit, along the body's axes: x forward, y right, z down. Sensors count from 1."""
@@ -111,6 +143,7 @@ class ImuSample:
     magnetic_field_gauss: tuple[float, float, float] | None = None
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class AirData:
     """What a vehicle says of the air: speeds, pressures, and the wind it has estimated (where the air moves TO)."""
@@ -130,6 +163,7 @@ class AirData:
     wind_up_mps: float | None = None
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class VehicleStatus:
     """What a vehicle says of itself: its kind, whether it is armed, its mode as a number of its autopilot."""
@@ -144,6 +178,7 @@ class VehicleStatus:
     landed: str | None = None  # "on ground", "in air", "taking off", "landing"; None where it does not say
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class FlightPlan:
     """Points that a vehicle has said, or was told, that it will pass; home comes as the sequence number 0."""
@@ -154,6 +189,7 @@ class FlightPlan:
     points: tuple[PlanPoint, ...]
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class PlanPoint:
     """One point of a flight plan. The altitude is above mean sea level when `altitude_msl_m`, else above home."""
@@ -166,6 +202,7 @@ class PlanPoint:
     altitude_above_home_m: float | None = None
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class Intent:
     """Where a vehicle says that it goes next: a point, or the item of its plan with this sequence number, or both."""
@@ -181,6 +218,7 @@ class Intent:
     height_m: float | None = None
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class Truth:
     """Where a simulator says the aircraft really is. Archived, drawn and scored against; never reaches a stage."""
@@ -203,6 +241,7 @@ Observation = (
 )
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class Heard:
     """One arrival, decoded: the unit of work of the pipeline.
