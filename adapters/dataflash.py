@@ -259,16 +259,7 @@ class DataflashFrames:
     def _home(self, origin: Values) -> None:
         if origin.get("Type") != _HOME:
             return
-        unknown = dict.fromkeys(("x", "y", "z", "approach_x", "approach_y", "approach_z"), math.nan)
-        self._teller.tell(
-            "HOME_POSITION",
-            latitude=degrees_e7(origin["Lat"]),
-            longitude=degrees_e7(origin["Lng"]),
-            altitude=round(origin["Alt"] * 1000),
-            q=[math.nan] * 4,
-            time_usec=self._teller.boot_us,
-            **unknown,
-        )
+        self._teller.tell_home(origin["Lat"], origin["Lng"], origin["Alt"])
 
     def _item(self, item: Values) -> None:
         if item["CNum"] == 0:

@@ -19,25 +19,24 @@ What links lose (kernel drops, resynced bytes) is counted with the links.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import count
 from typing import Protocol
 
 from adapters import Arrival, Source, told
-from adapters.clock import LIMIT_NS
 from adapters.epoch import SessionEpoch
 from adapters.frame_batches import MANY, NO_HEAD, Head, frame_of, take, wanted
 from adapters.listening import Listened
 from adapters.mavlink import MavlinkObserver
 from adapters.mavlink_frames import Frame, parse
-from adapters.meters import SECOND, SpeedMeter
+from adapters.meters import SECOND
 from adapters.radar import LandingRadarReceiver, observations
 from adapters.radar import Taken as TakenDatagram
+from adapters.radar_clocks import RadarClocks
 from adapters.signing import advice
 from adapters.unbroken import count_unbroken
 from adapters.vehicles import Component
 from adapters.wellbeing import vehicles_health
-from gateway.observation import FlightPlan, Heard, Observation, PlanPoint, Timing
+from gateway.observation import FlightPlan, Heard, Observation, PlanPoint
 from gateway.picture import Health
 
 Observations = tuple[Observation, ...]
@@ -50,12 +49,6 @@ class FrameGuard(Protocol):
 
     def judge(self, frame: bytes, source: int, now: int) -> str | None:
         """Why a frame of a source is refused, or None: it is believed. `now` is its stamp. Never raises."""
-
-
-@dataclass(slots=True)
-class _RadarClock:
-    speed: SpeedMeter = field(default_factory=SpeedMeter)
-    is_named_foreign: bool = False
 
 
 class Decoder:
@@ -82,9 +75,9 @@ class Decoder:
         self._which = wanted(self._wanted)
         self._signing = signing
         self._radar = LandingRadarReceiver(dict(keys or {}), live)
-        self._radar_clocks: dict[tuple[str, int], _RadarClock] = {}
         self._listened: dict[int, Listened] = {}
         self._notes = self._mavlink.notes
+        self._radar_clocks = RadarClocks(self._epoch, self._notes)
         self._plans: dict[str, tuple[PlanPoint, ...]] = {}  # that were told, by aircraft
         self._unclaimed: tuple[PlanPoint, ...] | None = None  # told of the first vehicle heard, and none was yet
         self._health: tuple[int, int, Health] | None = None
@@ -292,26 +285,5 @@ class Decoder:
             self.refused = outcome
             return ()
         self._notes.extend(outcome.notes)
-        timing = self._radar_timing(outcome, arrival.received_at)
+        timing = self._radar_clocks.timing(outcome.datagram.header, arrival.received_at)
         return observations(outcome.datagram, arrival.received_at, timing)
-
-    def _radar_timing(self, taken: TakenDatagram, received_at: int) -> Timing:
-        header = taken.datagram.header
-        key = ("radar", header.radar)
-        clock = self._radar_clocks.setdefault(key, _RadarClock())
-        clock.speed.hear(received_at, header.time)
-        if self._epoch.hear(key, header.time, received_at, clock.speed.speed) and self._epoch.offset_s:
-            text = f"The session runs on the clock of radar {header.radar}, {self._epoch.offset_s:+d} s from this machine's."
-            self._notes.append(("info", text))
-        timing = self._epoch.timing(key)
-        if timing is Timing.PROVISIONAL and abs(header.time - received_at) >= LIMIT_NS:
-            return Timing.FOREIGN  # until the session's time is known nobody can say that it is late
-        if timing is Timing.FOREIGN and not clock.is_named_foreign:
-            clock.is_named_foreign = True
-            lag = self._epoch.lag_s(key)
-            side = "behind" if lag > 0 else "ahead of"
-            text = (
-                f"The clock of radar {header.radar} is {abs(lag):.0f} s {side} the session's: it is shown, not fused."
-            )
-            self._notes.append(("warning", text))
-        return timing

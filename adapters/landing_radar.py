@@ -34,14 +34,12 @@ import struct
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 Reason = Literal[
     "length", "magic", "version", "checksum", "kind", "radar", "tag", "too many radars", "replayed", "value", "duplicate",
 ]  # fmt: skip
-REASONS: tuple[Reason, ...] = (
-    "length", "magic", "version", "checksum", "kind", "radar", "tag", "too many radars", "replayed", "value", "duplicate",
-)  # fmt: skip
+REASONS: tuple[Reason, ...] = get_args(Reason)
 STATES = ("off", "standby", "operating", "fault")
 MODES = ("search", "precision approach")
 MAXIMUM_PLOTS = 40

@@ -19,9 +19,9 @@ Two simulators that stand at one place and booted within 50 ms of one another ca
 from __future__ import annotations
 
 import math
-from collections import deque
+from collections import Counter, deque
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import islice, pairwise
 from statistics import median
 from struct import Struct
 
@@ -53,7 +53,7 @@ class Trace:
 
     since: int  # stamp
     moves: dict[int, deque[Sample]] = field(default_factory=dict)
-    waiting: dict[int, deque[Sample]] = field(default_factory=dict)  # not compared yet
+    heard: Counter[int] = field(default_factory=Counter)  # how many of each message were taken in
     least: int | None = None  # (received - boot), ns
     utc_offset: int | None = None
     _told: tuple[int, int] | None = None
@@ -70,16 +70,15 @@ class Trace:
         told = self.moves.get(message)
         if told is None:
             told = self.moves[message] = deque(maxlen=_REMEMBERED)
-            self.waiting[message] = deque(maxlen=_REMEMBERED)
         if told and boot_ms <= told[-1][0]:
             if told[-1][0] - boot_ms < _BACK_MS:
                 return
             self._begin_anew()
         told.append(sample)
-        self.waiting[message].append(sample)
+        self.heard[message] += 1
 
     def _begin_anew(self) -> None:
-        for samples in (*self.moves.values(), *self.waiting.values()):
+        for samples in self.moves.values():
             samples.clear()
         self._envelope, self.utc_offset, self._told = Envelope(), None, None
 
@@ -99,6 +98,7 @@ class Likeness:
     other: Trace
     apart_m: deque[float] = field(default_factory=lambda: deque(maxlen=_REMEMBERED))
     apart_rad: deque[float] = field(default_factory=lambda: deque(maxlen=_REMEMBERED))
+    _compared: Counter[int] = field(default_factory=Counter)  # of what `one` has heard
     _first: Sample | None = None
     _last: Sample | None = None
     _far_since: int | None = None  # time since boot, ms
@@ -106,10 +106,14 @@ class Likeness:
 
     def compare(self) -> None:
         """Compare what has come of `one`, as far as `other` has told of the same times since boot."""
-        for message, waiting in self.one.waiting.items():
+        for message, told in self.one.moves.items():
             there = self.other.moves.get(message)
-            while waiting and there and waiting[0][0] <= there[-1][0]:
-                sample = waiting.popleft()
+            waiting = min(self.one.heard[message] - self._compared[message], len(told))
+            self._compared[message] = self.one.heard[message] - waiting
+            for sample in list(islice(told, len(told) - waiting, None)):
+                if not there or sample[0] > there[-1][0]:
+                    break
+                self._compared[message] += 1
                 then = _at(there, sample[0], message)
                 if then is None:
                     continue

@@ -26,8 +26,6 @@ from typing import Any, NamedTuple, cast
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import all as dialect
 
-from adapters.sequences import SequenceCheck as SequenceCheck  # where others look for it
-
 V2, V1 = 0xFD, 0xFE
 _SIGNED = 0x01
 LONGEST = 280 + 13

@@ -15,9 +15,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Callable
+from typing import Any
 
 from adapters.mavlink_frames import fields
-from adapters.moments import Moments, Observations, When
+from adapters.moments import Moments, Observations, Reader, When
 from adapters.roles import ARDUPILOT
 from adapters.vehicles import Component, Vehicle
 from gateway.observation import AirData, Attitude, ImuSample, Observation
@@ -132,31 +134,27 @@ def raw_imu(
     return _scaled(vehicle, number + 1, axes, when, received_at, counters)
 
 
-def scaled_imu(
-    moments: Moments, component: Component, vehicle: Vehicle, payload: bytes, received_at: int, counters: Counter[str]
-) -> Observations:
-    """SCALED_IMU: sensor 1."""
-    *axes, boot_ms = _read_scaled(payload)
-    when = moments.near(component, boot_ms * 1000, received_at)
-    return _scaled(vehicle, 1, axes, when, received_at, counters)
+def _scaled_sensor(read: Callable[[bytes], tuple[Any, ...]], sensor: int) -> Reader:
+    """The reader of a sensor with a message of its own."""
+
+    def hear(
+        moments: Moments,
+        component: Component,
+        vehicle: Vehicle,
+        payload: bytes,
+        received_at: int,
+        counters: Counter[str],
+    ) -> Observations:
+        *axes, boot_ms = read(payload)
+        when = moments.near(component, boot_ms * 1000, received_at)
+        return _scaled(vehicle, sensor, axes, when, received_at, counters)
+
+    return hear
 
 
-def scaled_imu_2(
-    moments: Moments, component: Component, vehicle: Vehicle, payload: bytes, received_at: int, counters: Counter[str]
-) -> Observations:
-    """SCALED_IMU2: sensor 2."""
-    *axes, boot_ms = _read_scaled_2(payload)
-    when = moments.near(component, boot_ms * 1000, received_at)
-    return _scaled(vehicle, 2, axes, when, received_at, counters)
-
-
-def scaled_imu_3(
-    moments: Moments, component: Component, vehicle: Vehicle, payload: bytes, received_at: int, counters: Counter[str]
-) -> Observations:
-    """SCALED_IMU3: sensor 3."""
-    *axes, boot_ms = _read_scaled_3(payload)
-    when = moments.near(component, boot_ms * 1000, received_at)
-    return _scaled(vehicle, 3, axes, when, received_at, counters)
+scaled_imu = _scaled_sensor(_read_scaled, 1)
+scaled_imu_2 = _scaled_sensor(_read_scaled_2, 2)
+scaled_imu_3 = _scaled_sensor(_read_scaled_3, 3)
 
 
 def highres_imu(

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 
-from adapters.fixes import COVARIANCE, ESTIMATE, KINDS, RECEIVER, Fix
+from adapters.fixes import COVARIANCE, ESTIMATE, KINDS, RECEIVER, Fix, Fixes
 from adapters.mavlink_frames import fields
 from adapters.moments import Moments, Observations
 from adapters.vehicles import Component, Vehicle
@@ -55,7 +55,6 @@ def estimate(
     if fixes.refuses(ESTIMATE, (boot_ms,), (latitude, longitude), now, altitudes_mm=(altitude, above_home)):
         return ()
     valid_at, timing = moments.when(component, boot_ns, received_at)
-    given = is_altitude(altitude, counters)
     moving = max(abs(north), abs(east), abs(down)) < 32767
     if not moving:
         counters["velocity out of range"] += 1
@@ -66,10 +65,7 @@ def estimate(
             vehicle.name,
             valid_at,
             received_at,
-            latitude * DEGE7,
-            longitude * DEGE7,
-            altitude / 1000 if given else None,
-            fixes.height_m(altitude) if given else None,
+            *_place(fixes, latitude, longitude, altitude, counters),
             east / 100 if moving else None,
             north / 100 if moving else None,
             -down / 100 if moving else None,
@@ -95,7 +91,6 @@ def estimate_with_covariance(
     both = (altitude, above_home) if by_gps else None
     if fixes.refuses(COVARIANCE, (usec,), (latitude, longitude), now, needs_fix=by_gps, altitudes_mm=both):
         return ()
-    given = is_altitude(altitude, counters)
     moving = all(math.isfinite(one) and abs(one) < _FASTEST_MPS for one in rest[:3])
     if not moving:
         counters["velocity out of range"] += 1
@@ -110,10 +105,7 @@ def estimate_with_covariance(
             vehicle.name,
             when[0],
             received_at,
-            latitude * DEGE7,
-            longitude * DEGE7,
-            altitude / 1000 if given else None,
-            fixes.height_m(altitude) if given else None,
+            *_place(fixes, latitude, longitude, altitude, counters),
             east if moving else None,
             north if moving else None,
             -down if moving else None,
@@ -142,7 +134,6 @@ def receiver_fix(
         return ()
     told = moments.since_boot(component, usec, received_at)
     valid_at, timing = moments.when(component, at if told is None or told > at else told, received_at)
-    given = is_altitude(altitude, counters)
     moving = speed != 65535 and course <= 36000
     angle = math.radians(course / 100)
     horizontal, vertical, velocity = fixes.sigmas(at)
@@ -152,10 +143,7 @@ def receiver_fix(
             vehicle.name,
             valid_at,
             received_at,
-            latitude * DEGE7,
-            longitude * DEGE7,
-            altitude / 1000 if given else None,
-            fixes.height_m(altitude) if given else None,
+            *_place(fixes, latitude, longitude, altitude, counters),
             speed / 100 * math.sin(angle) if moving else None,
             speed / 100 * math.cos(angle) if moving else None,
             None,
@@ -165,6 +153,15 @@ def receiver_fix(
             timing=timing,
         ),
     )
+
+
+def _place(
+    fixes: Fixes, latitude: int, longitude: int, altitude_mm: int, counters: Counter[str]
+) -> tuple[float, float, float | None, float | None]:
+    """Latitude and longitude (rad), altitude above mean sea level and height above the ellipsoid (m), as reports hold them."""
+    given = is_altitude(altitude_mm, counters)
+    altitude_m, height_m = (altitude_mm / 1000, fixes.height_m(altitude_mm)) if given else (None, None)
+    return latitude * DEGE7, longitude * DEGE7, altitude_m, height_m
 
 
 def is_altitude(altitude_mm: int, counters: Counter[str]) -> bool:

@@ -120,6 +120,19 @@ class Teller:
         told = {**dict.fromkeys(_HIGHRES, math.nan), **values}
         self.tell("HIGHRES_IMU", time_usec=self.boot_us, fields_updated=updated, id=sensor, **told)
 
+    def tell_home(self, latitude_deg: float, longitude_deg: float, altitude_msl_m: float) -> None:
+        """A HOME_POSITION; which way it faces is not known."""
+        unknown = dict.fromkeys(("x", "y", "z", "approach_x", "approach_y", "approach_z"), math.nan)
+        self.tell(
+            "HOME_POSITION",
+            latitude=degrees_e7(latitude_deg),
+            longitude=degrees_e7(longitude_deg),
+            altitude=round(altitude_msl_m * 1000),
+            q=[math.nan] * 4,
+            time_usec=self.boot_us,
+            **unknown,
+        )
+
     def take(self) -> list[tuple[int, bytes]]:
         """What was told since the last time."""
         told, self.frames = self.frames, []

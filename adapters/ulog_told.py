@@ -180,16 +180,7 @@ class UlogTeller:
     def _home(self, home: Values) -> None:
         if not home.get("valid_hpos", True) or not home.get("valid_alt", True):
             return
-        unknown = dict.fromkeys(("x", "y", "z", "approach_x", "approach_y", "approach_z"), math.nan)
-        self.teller.tell(
-            "HOME_POSITION",
-            latitude=degrees_e7(home["lat"]),
-            longitude=degrees_e7(home["lon"]),
-            altitude=round(home["alt"] * 1000),
-            q=[math.nan] * 4,
-            time_usec=self.teller.boot_us,
-            **unknown,
-        )
+        self.teller.tell_home(home["lat"], home["lon"], home["alt"])
 
     def _mission(self, mission: Values) -> None:
         if mission.get("count", 0) > 0 and mission["current_seq"] >= 0:

@@ -22,10 +22,6 @@ from adapters.fixes import Fixes
 from adapters.likeness import ATTITUDE, GLOBAL_POSITION_INT, Likeness, Trace
 from adapters.meters import Rates
 from adapters.plans import PlanBook
-from adapters.roles import ARDUPILOT as ARDUPILOT
-from adapters.roles import INVALID_AUTOPILOT as INVALID_AUTOPILOT
-from adapters.roles import PX4 as PX4
-from adapters.roles import STATIONS as STATIONS
 from adapters.roles import by_heartbeat, by_number, is_vehicle
 from adapters.sequences import SequenceCheck, Siblings
 from gateway.observation import VehicleStatus

@@ -147,21 +147,11 @@ def place_reports(
     height = np.array(heights_m)
     has_height = ~np.isnan(height)
     guesses = {row: _guessed(report, site) for row, report in enumerate(reports) if not has_height[row]}
-    for row, (guess, _) in guesses.items():
-        height[row] = guess
+    for row, (guessed_m, _) in guesses.items():
+        height[row] = guessed_m
     ecef = geodetic_to_ecef(latitude, longitude, height)
     enu = turn(frame.enu_from_ecef, ecef - frame.origin_ecef_m)
-    nan = math.nan
-    local = np.array(
-        [
-            [
-                nan if report.velocity_east_mps is None else report.velocity_east_mps,
-                nan if report.velocity_north_mps is None else report.velocity_north_mps,
-                nan if report.velocity_up_mps is None else report.velocity_up_mps,
-            ]
-            for report in reports
-        ]
-    )
+    local = _velocities_mps(reports)
     # A component alone cannot be turned into the runway's axes: then what there is stays in the local ones.
     axes = frame.local_from_enu(latitude, longitude)
     velocity = (axes.transpose(0, 2, 1) @ local[:, :, None])[:, :, 0]
@@ -169,17 +159,8 @@ def place_reports(
     in_part = ~has_height | ((missing > 0) & (missing < 3))
     fixes = []
     for row, report in enumerate(reports):
-        level = report.horizontal_sigma_m or site.position.sigma_m
-        upright = report.vertical_sigma_m or report.horizontal_sigma_m or site.position.sigma_m
-        if report.timing_sigma_s:
-            level = math.hypot(level, _speed_mps(report) * report.timing_sigma_s)
-            upright = math.hypot(upright, (report.velocity_up_mps or 0.0) * report.timing_sigma_s)
-        if row in guesses:
-            upright = guesses[row][1]
-        sigma = np.maximum(np.array([level, level, upright]), LEAST_POSITION_SIGMA_M)
+        guess = guesses.get(row)
         usual = TRAFFIC_VELOCITY_SIGMA_MPS if report.timing_sigma_s else site.position.velocity_sigma_mps
-        speed = max(report.velocity_sigma_mps or usual, LEAST_VELOCITY_SIGMA_MPS)
-        comparable = report.timing in (Timing.UTC, Timing.ENVELOPE)
         fixes.append(
             Fix(
                 report.valid_at,
@@ -187,16 +168,33 @@ def place_reports(
                 report.received_at,
                 report.aircraft,
                 enu[row],
-                sigma,
+                _position_sigmas_m(report, site, None if guess is None else guess[1]),
                 velocity[row],
-                speed,
-                comparable,
+                max(report.velocity_sigma_mps or usual, LEAST_VELOCITY_SIGMA_MPS),
+                report.timing in (Timing.UTC, Timing.ENVELOPE),
                 Local(axes[row], local[row], bool(has_height[row])) if in_part[row] else None,
-                nan if report.pressure_altitude_m is None else report.pressure_altitude_m,
+                math.nan if report.pressure_altitude_m is None else report.pressure_altitude_m,
                 report.callsign,
             )
         )
     return fixes
+
+
+def _velocities_mps(reports: Sequence[GpsReport]) -> Floats:
+    """East, north, up at each report's place, (n, 3); NaN = not measured."""
+    told = [(report.velocity_east_mps, report.velocity_north_mps, report.velocity_up_mps) for report in reports]
+    return np.array([[math.nan if part is None else part for part in one] for one in told])
+
+
+def _position_sigmas_m(report: GpsReport, site: Site, guessed_m: float | None) -> Floats:
+    """East, north, up, (3,): what the report says, else the site; `guessed_m`: of a height that it does not tell."""
+    level = report.horizontal_sigma_m or site.position.sigma_m
+    upright = report.vertical_sigma_m or report.horizontal_sigma_m or site.position.sigma_m
+    if report.timing_sigma_s:
+        level = math.hypot(level, _speed_mps(report) * report.timing_sigma_s)
+        upright = math.hypot(upright, (report.velocity_up_mps or 0.0) * report.timing_sigma_s)
+    sigma: Floats = np.array([level, level, upright if guessed_m is None else guessed_m])
+    return np.maximum(sigma, LEAST_POSITION_SIGMA_M, out=sigma)
 
 
 def _guessed(report: GpsReport, site: Site) -> tuple[float, float]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -144,6 +146,20 @@ def buffer_of(link: Link) -> str:
     return f" The system holds {link.granted_bytes // 1024} KiB for it." if isinstance(link, UdpLink) else ""
 
 
+@contextlib.contextmanager
+def _opened(mavlink: list[str], radar: list[str]) -> Iterator[tuple[list[Link], list[Link]]]:
+    """The links of both kinds, open while the context lasts. Raises UsageError, LinkError."""
+    from gateway.runtime.links import open_link
+    from gateway.runtime.urls import MAVLINK_PORT, RADAR_PORT
+
+    with contextlib.ExitStack() as opened:
+
+        def links(texts: list[str], port: int) -> list[Link]:
+            return [opened.enter_context(contextlib.closing(open_link(url))) for url in take.read_urls(texts, port)]
+
+        yield links(mavlink, MAVLINK_PORT), links(radar, RADAR_PORT)
+
+
 def live(
     mavlink: MavlinkOption = None,
     radar: RadarOption = None,
@@ -176,13 +192,12 @@ def live(
     from gateway.cli.viewing import Viewing, chosen
     from gateway.runtime.allowed import AllowError, parse_allowed
     from gateway.runtime.folder import FolderError
-    from gateway.runtime.links import open_link
     from gateway.runtime.loop import run_live
     from gateway.runtime.manners import Manners
     from gateway.runtime.setup import RunFailure, Setup
     from gateway.runtime.signals import StopSignals
     from gateway.runtime.told_plans import told_line
-    from gateway.runtime.urls import MAVLINK_PORT, RADAR_PORT, LinkError
+    from gateway.runtime.urls import MAVLINK_PORT, LinkError
 
     place = take.read_place(site)
     looks = chosen(viewer)
@@ -202,19 +217,19 @@ def live(
     )
     speaks = heartbeat or request_rates or fetch_mission
     manners = Manners(heartbeat=heartbeat, request_rates=request_rates, fetch_mission=fetch_mission, key=signing_key)
-    links: list[list[Link]] = [[], []]
     try:
         allowed = parse_allowed(allow_peer or (), allow_system or ())
         told = [told_line(path, vehicle) for vehicle, path in read_plans(plan)]
-        for group, texts, port in ((0, mavlink, MAVLINK_PORT), (1, radar, RADAR_PORT)):
-            for url in take.read_urls(texts or [], port):
-                links[group].append(open_link(url))
-        with StopSignals() as stop, Viewing(looks) as viewing, Display(viewing, quiet=quiet, as_json=json) as display:
+        with (
+            _opened(mavlink or [], radar or []) as links,
+            StopSignals() as stop,
+            Viewing(looks) as viewing,
+            Display(viewing, quiet=quiet, as_json=json) as display,
+        ):
             for link in (*links[0], *links[1]):
                 display.say(f"Listening on {link.url}.{buffer_of(link)}")
             summary = run_live(
-                links[0],
-                links[1],
+                *links,
                 setup,
                 seconds=seconds,
                 watch=display.watch,
@@ -228,6 +243,3 @@ def live(
         raise UsageError(str(error)) from error
     except RunFailure as failure:
         raise RunError(str(failure)) from failure
-    finally:
-        for link in (*links[0], *links[1]):
-            link.close()

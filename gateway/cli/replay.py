@@ -184,14 +184,14 @@ def replay(
     from gateway.runtime.setup import RunFailure, Setup
     from gateway.runtime.signals import StopSignals
 
-    place = take.read_place(site)
+    place, signing_key = take.read_place(site), take.read_signing_key(key)
     looks = chosen(viewer)
     pace = read_speed(speed, None if looks is take.Viewer.none else 1.0)
     try:
-        playback = open_playback(files, read_plans(plan))
+        playback = open_playback(files, read_plans(plan), signing_key)
         found = place or playback.place or playback.find_place()
-        options = take.change(playback.options, weighting, association, estimator)
         has_own_place = place is not None or playback.place is not None
+        options = take.change(playback.options, weighting, association, estimator)
         playback, options = seek(playback, options, begin, end, mute)
         setup = Setup(
             place=found,
@@ -199,7 +199,7 @@ def replay(
             archive=archive,
             serve=take.read_serve(serve, looks),
             keys=take.read_keys(place, site),
-            signing_key=take.read_signing_key(key),
+            signing_key=signing_key,
             is_watched=pace is not None or looks is not take.Viewer.none,
             name="" if has_own_place else files[0].stem,
             command=tuple(sys.argv[1:]),

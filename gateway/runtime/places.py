@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 from adapters import Arrival, Source
 from adapters.decode import Decoder
+from adapters.signing import SigningGuard
 from gateway.observation import FlightPlan, GpsReport, Heard, Observation, VehicleStatus
 from gateway.runtime.setup import Place
 from gateway.settings import format_site, parse_site
 
 _ASK_EVERY_NS = 1_000_000_000
+_TOGETHER = 1000  # arrivals that are decoded at once
 _THIN_NS = 1_000_000_000  # a position a second of each aircraft tells where it stands
 
 
@@ -70,18 +73,20 @@ class Overview:
     epoch_offset_s: int
 
 
-def look_over(sources: Iterable[Source], arrivals: Iterable[Arrival]) -> Overview:
-    """One reading of a whole recording."""
-    decoder, finder = Decoder(tuple(sources)), PlaceFinder()
+def look_over(sources: Iterable[Source], arrivals: Iterable[Arrival], signing_key: bytes | None = None) -> Overview:
+    """One reading of a whole recording; with a key, what is not signed with it tells nothing."""
+    guard = None if signing_key is None else SigningGuard(signing_key)
+    decoder, finder = Decoder(tuple(sources), signing=guard), PlaceFinder()
     vehicles: dict[str, None] = {}
     extents: dict[int, tuple[int, int]] = {}
-    for arrival in arrivals:
-        stamp, source = arrival.received_at, arrival.source
-        extents[source] = (extents[source][0] if source in extents else stamp, stamp)
-        heard = decoder.hear(arrival)
-        for observation in () if heard is None else heard.observations:
-            finder.gather(observation)
-            if isinstance(observation, VehicleStatus):
-                vehicles.setdefault(observation.aircraft)
+    left = iter(arrivals)
+    while some := list(islice(left, _TOGETHER)):
+        for stamp, source, _, _ in some:
+            extents[source] = (extents[source][0] if source in extents else stamp, stamp)
+        for _, heard in decoder.hear_many(some)[0]:
+            for observation in heard.observations:
+                finder.gather(observation)
+                if isinstance(observation, VehicleStatus):
+                    vehicles.setdefault(observation.aircraft)
     place = finder.place(complete=True)
     return Overview(place, tuple(vehicles), extents, decoder.epoch_offset_s or 0)

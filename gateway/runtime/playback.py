@@ -54,6 +54,7 @@ class Playback:
     watermark: int | None = None
     place: Place | None = None
     options: Options = field(default_factory=Options)
+    signing_key: bytes | None = None  # with one, only frames that are signed with it tell of the place
     _read_bytes: int = 0
     _overview: Overview | None = None
 
@@ -91,7 +92,7 @@ class Playback:
     def overview(self) -> Overview:
         """What all of it tells; read once, when it is first asked for."""
         if self._overview is None:
-            self._overview = look_over(self.sources, self.arrivals())
+            self._overview = look_over(self.sources, self.arrivals(), self.signing_key)
         return self._overview
 
     def find_place(self) -> Place | None:
@@ -129,16 +130,17 @@ class Playback:
 _order = attrgetter("received_at", "source")
 
 
-def open_playback(paths: Sequence[Path], plans: Missions = ()) -> Playback:
+def open_playback(paths: Sequence[Path], plans: Missions = (), signing_key: bytes | None = None) -> Playback:
     """Recordings with mission files among them or as `plans`, or one archived session (completed first, if killed).
 
+    `signing_key`: with one, frames that are not signed with it tell nothing of the recordings' place and vehicles.
     Raises FileError or FolderError, one sentence, for what cannot be replayed.
     """
     kinds = {path: kind_of(path) for path in paths}
     if "session" not in kinds.values():
         missions = [(None, path) for path in paths if kinds[path] in ("plan", "waypoints")]
         recordings = [path for path in paths if kinds[path] not in ("plan", "waypoints")]
-        return _of_files(recordings, (*missions, *plans))
+        return _of_files(recordings, (*missions, *plans), signing_key)
     if len(paths) > 1 or plans:
         raise FileError("A session is replayed alone: name one folder, or files.")
     return _of_session(paths[0])
@@ -168,7 +170,7 @@ def _input(folder: Path, described: InputFile) -> SessionInput:
     return SessionInput(path, described.source)
 
 
-def _of_files(paths: Sequence[Path], missions: Missions) -> Playback:
+def _of_files(paths: Sequence[Path], missions: Missions, signing_key: bytes | None) -> Playback:
     if not paths:
         raise FileError("A mission file is told along with a recording: name that too.")
     files: list[Readable] = []
@@ -177,7 +179,7 @@ def _of_files(paths: Sequence[Path], missions: Missions) -> Playback:
         recording = open_recording(path, number)
         number += len(recording.sources)
         files.append(recording)
-    playback = Playback(tuple(files), 0)
+    playback = Playback(tuple(files), 0, signing_key=signing_key)
     _name_apart(files)
     first = next(playback.arrivals())  # raises FileError when there is none
     playback.started_at = first.received_at
@@ -188,7 +190,7 @@ def _of_files(paths: Sequence[Path], missions: Missions) -> Playback:
     told = tuple(told_plan(path, aircraft, number, next(stamps)) for aircraft, path in whose(missions, vehicles))
     files.append(ToldInput(missions[0][1], (told_source(number, missions),), told))
     _name_apart(files)
-    return Playback(tuple(files), playback.started_at)
+    return Playback(tuple(files), playback.started_at, signing_key=signing_key)
 
 
 def _name_apart(files: Sequence[Readable]) -> None:

@@ -137,7 +137,6 @@ class Survey:
     radars: dict[int, RadarSeen] = field(default_factory=dict)
     observations: Counter[str] = field(default_factory=Counter)
     counters: dict[str, int] = field(default_factory=dict)
-    notes: list[tuple[str, str]] = field(default_factory=list)
     vehicles: dict[str, VehicleHealth] = field(default_factory=dict)  # each at its worst median delay
     place: Place | None = None
     used: frozenset[int] = frozenset()  # the MAVLink messages that say something to the gateway
@@ -162,7 +161,6 @@ def survey(playback: Playback, tell: Callable[[float], None] = lambda fraction: 
             for observation in heard.observations:
                 finder.gather(observation)
                 _see(found, observation)
-            found.notes += heard.notes
         if arrival.received_at >= due:
             due = arrival.received_at + _SAMPLE_NS
             _remember(found, decoder.health(arrival.received_at))

@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import all as dialect
 
-from adapters.mavlink_frames import FrameEncoder, FrameScanner, SequenceCheck, encode, fields, parse
+from adapters.mavlink_frames import FrameEncoder, FrameScanner, encode, fields, parse
+from adapters.sequences import SequenceCheck
 from adapters.tlog import TlogReader
 
 EXCERPT = Path(__file__).parents[1] / "data" / "sitl-landing-excerpt.tlog"

@@ -1,12 +1,14 @@
 """Who is who: one vehicle over several links, several vehicles of one number, and those who are no vehicles."""
 
 import math
+import struct
 from dataclasses import dataclass, field
 
 import pytest
 
 from adapters import Arrival, Source
 from adapters.decode import Decoder
+from adapters.likeness import GLOBAL_POSITION_INT, Likeness, Trace
 from adapters.mavlink_frames import FrameEncoder
 from gateway.observation import Attitude, GpsReport, Heard, VehicleStatus
 
@@ -305,3 +307,19 @@ def test_a_link_that_brings_only_heartbeats_keeps_no_other_from_being_used() -> 
     assert aircraft(heard, 11.0) == {"mavlink:1"}
     assert len([one for one in reports(heard) if one.received_at > T0 + 111 * SECOND]) > 40
     assert not [note for note in notes if "wo vehicles" in note]
+
+
+def test_of_three_links_each_pair_is_compared_in_full() -> None:
+    """What one link says of its motion counts in the comparison with every other link."""
+    traces = [Trace(0) for _ in range(3)]
+    likenesses = [Likeness(traces[0], other) for other in traces[1:]]
+    for second in range(10):
+        for place, trace in enumerate(traces):
+            at_ms, north = second * 1000 + place * 100, 310_000_000 + 100 * (second * 1000 + place * 100)
+            payload = struct.pack("<Iiii", at_ms, north, 1_040_000_000, 500_000)
+            trace.hear(GLOBAL_POSITION_INT, payload, at_ms * 10**6)
+        for likeness in likenesses:
+            likeness.compare()
+    compared = [list(likeness.apart_m) for likeness in likenesses]
+    assert [len(one) for one in compared] == [9, 9]
+    assert max(max(one) for one in compared) < 0.5

@@ -37,14 +37,16 @@ def _numbers(observation: Observation) -> list[float]:
     return [one for one in flat if isinstance(one, float)]
 
 
-def _hear(observer: MavlinkObserver, frame: Frame, at: int) -> tuple[Observation, ...]:
-    found = observer.hear(0, frame, at, Counter())
-    for observation in found:
-        assert all(math.isfinite(number) for number in _numbers(observation)), observation
-        if isinstance(observation, GpsReport):
-            assert abs(observation.latitude_rad) <= math.pi / 2 + 1e-9
-            assert abs(observation.longitude_rad) <= math.pi + 1e-9
-    return found
+def _is_sane(observation: Observation) -> bool:
+    """Whether every number is one, and every place on the globe."""
+    on_the_globe = not isinstance(observation, GpsReport) or (
+        abs(observation.latitude_rad) <= math.pi / 2 + 1e-9 and abs(observation.longitude_rad) <= math.pi + 1e-9
+    )
+    return on_the_globe and all(math.isfinite(number) for number in _numbers(observation))
+
+
+def _mistakes(observer: MavlinkObserver, frame: Frame, at: int) -> list[Observation]:
+    return [one for one in observer.hear(0, frame, at, Counter()) if not _is_sane(one)]
 
 
 @pytest.mark.parametrize("message", WANTED, ids=[message_name(one) for one in WANTED])
@@ -53,19 +55,21 @@ def test_no_payload_of_a_message_raises_or_gives_a_number_that_is_none(message: 
     random_bytes = random.Random(message)
     size = definitions()[message].unpacker.size
     observer = MavlinkObserver(SessionEpoch(), {0: "a link"})
-    _hear(observer, _frame(0, b""), T0)
+    mistakes = _mistakes(observer, _frame(0, b""), T0)
     for number in range(150):
         if number % 2:
             payload = random_bytes.randbytes(random_bytes.randint(0, size + 3))
         else:
             payload = b"".join(random_bytes.choice(WORDS) for _ in range(size // 4 + 1))[:size]
-        _hear(observer, _frame(message, payload, number & 255), T0 + number * SECOND // 10)
+        mistakes += _mistakes(observer, _frame(message, payload, number & 255), T0 + number * SECOND // 10)
+    assert mistakes == []
 
 
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.tuples(st.sampled_from(WANTED), st.binary(max_size=60), st.integers(0, 10**10)), max_size=40))
 def test_no_succession_of_messages_raises(told: list[tuple[int, bytes, int]]) -> None:
     observer = MavlinkObserver(SessionEpoch(), {0: "a link"})
-    _hear(observer, _frame(0, b""), T0)
+    mistakes = _mistakes(observer, _frame(0, b""), T0)
     for number, (message, payload, after) in enumerate(told):
-        _hear(observer, _frame(message, payload, number & 255), T0 + after)
+        mistakes += _mistakes(observer, _frame(message, payload, number & 255), T0 + after)
+    assert mistakes == []

@@ -1,9 +1,11 @@
 """The place that a stream tells of while it comes in."""
 
 from dataclasses import replace
+from pathlib import Path
 
 from gateway.observation import GpsReport, Heard
 from gateway.runtime.places import PlaceFinder
+from gateway.runtime.playback import open_playback
 
 SECOND = 1_000_000_000
 NOW, RECORDED = 1_790_000_000 * SECOND, 1_767_000_000 * SECOND
@@ -22,3 +24,10 @@ def test_a_place_is_found_also_when_the_clock_is_set_back_by_a_year() -> None:
     found = [second for second, place in enumerate(places) if place is not None]
     assert found
     assert 17 <= found[0] <= 19  # it stands from second 12 on, and standing takes 5 s
+
+
+def test_with_a_key_frames_that_are_not_signed_with_it_tell_no_place() -> None:
+    """Else a stranger could say where the runway is."""
+    excerpt = Path(__file__).parents[2] / "data" / "sitl-landing-excerpt.tlog"
+    assert open_playback([excerpt]).find_place() is not None
+    assert open_playback([excerpt], signing_key=bytes(range(32))).find_place() is None
