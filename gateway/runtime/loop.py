@@ -163,7 +163,7 @@ def run_replay(
             if playback.watermark is not None:
                 watch(run, run.work([], playback.watermark))
         if run.place is None and ended == "done":
-            unbelieved = ", of what is signed with the key" if setup.signing_key is not None else ""
+            unbelieved = " that is signed with the key" if setup.signing_key is not None else ""
             raise RunFailure(
                 f"Nothing in this recording{unbelieved} tells where the runway is; give a site file with --site."
             )
