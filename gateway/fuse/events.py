@@ -1,0 +1,68 @@
+"""What the filter works on: measurements in their order, jobs of them, and the events that they leave behind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.align import Fix, Plot, Polar
+from gateway.estimators.modes import Mixture
+
+Floats = NDArray[np.float64]
+Measure = Fix | Plot
+Near = tuple[int, Polar, Polar]  # radar, range, azimuth, elevation, and their sigmas
+Neighbour = Callable[[Fix], Near | None]  # what a track's radar measured at a report's time
+Belief = Mixture | Floats | None  # what an estimator keeps of a track beside mean and covariance, of one track
+
+NEVER = -(1 << 62)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Event:
+    """A track's state after one of its measurements, and when each kind of source last saw it."""
+
+    measure: Measure
+    mean: Floats  # (9,)
+    covariance: Floats  # (9, 9)
+    memory: Floats  # (w, 3) past innovations of the position source
+    gps_at: int
+    radar_at: int
+    interval: int  # ns, the longest of the last few between measurements
+    outlying: bool
+    height_at: int  # when the vertical was last measured
+    barometric: Fix | None  # the last report with a pressure altitude
+    callsign: str | None
+    belief: Belief  # only the estimator that made it reads it
+    far_off: int = 0  # measurements in a row, this one included, that were far from where the track was
+    restarted: str | None = None  # why the filter began anew with this measurement; None = it went on
+
+    @property
+    def at(self) -> int:
+        """When the state holds."""
+        return self.measure.at
+
+    @property
+    def mixture(self) -> Mixture | None:
+        """The modes' states, where the estimator has modes; mean and covariance are then their mixture's."""
+        return self.belief if isinstance(self.belief, Mixture) else None
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """Measurements of one track, in order, to be worked in after a state; without a state the first one starts it."""
+
+    track: int
+    base: Event | None
+    measures: Sequence[Measure]
+    neighbour: Neighbour
+    fresh: int = -1  # serial of the measurement that asked for it
+
+
+def rank(measure: Measure) -> tuple[int, int, str, int]:
+    """The order in which measurements are worked in: by validity; at one instant by source, then by arrival."""
+    if isinstance(measure, Fix):
+        return measure.at, 0, measure.aircraft, measure.serial
+    return measure.at, 1, f"{measure.radar:05d}/{measure.number:05d}", measure.serial
