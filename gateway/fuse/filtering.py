@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix, Plot
 from gateway.estimators.kalman import Estimate
+from gateway.fuse.agreement import score_after
 from gateway.fuse.estimating import Estimator, Group, InteractingModels, SingleModel, stacked
 from gateway.fuse.events import NEVER, Belief, Event, Job, Measure, Near, Neighbour, rank
 from gateway.fuse.weighting import Model
@@ -78,7 +79,7 @@ def _advance(
         after = estimator.advance(before, Group(kind, radar, chosen, seen, elapsed_s, memory))
         for i, row in enumerate(rows):
             kept = after.memory[i], before[i], bool(after.outlying[i]), after.beliefs[i]
-            events[row] = _event(chosen[i], after.state, i, *kept)
+            events[row] = _event(chosen[i], after.state, i, *kept, score_after(before[i], chosen[i], model))
     return [events[row] for row in range(len(measures))]
 
 
@@ -99,6 +100,7 @@ def _event(
     base: Event | None,
     outlying: bool,
     belief: Belief,
+    score: float = 0.0,
 ) -> Event:
     gps_at, radar_at, height_at = (base.gps_at, base.radar_at, base.height_at) if base else (NEVER, NEVER, NEVER)
     barometric, callsign = (base.barometric, base.callsign) if base else (None, None)
@@ -127,4 +129,5 @@ def _event(
         barometric,
         callsign,
         belief,
+        score=score,
     )

@@ -50,6 +50,7 @@ class Model:
     motion: Motion
     radars: Mapping[int, RadarFrame]
     modes: Modes | None = None  # with them, states come as rows of `together` guesses at each track
+    confirm_score: float = math.log(1e4)  # logarithm of the odds that confirm a track
 
     @classmethod
     def of(cls, options: Options, position: PositionSource, radars: Mapping[int, RadarFrame]) -> Model:
@@ -58,7 +59,7 @@ class Model:
         upright = options.vertical_acceleration_sigma_mps2**2 * options.acceleration_time_s
         error = position.systematic_m / math.sqrt(3.0) if options.weighting == "bias" else 0.0
         motion = Motion((level, level, upright), error)
-        return cls(options.weighting, motion, radars, modes_of(options, motion))
+        return cls(options.weighting, motion, radars, modes_of(options, motion), math.log(options.confirm_odds))
 
     @property
     def together(self) -> int:
