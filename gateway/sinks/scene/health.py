@@ -1,8 +1,8 @@
 """How sources and vehicles are heard, and what vehicles last said of themselves: /health.
 
-Curves for what changes: /health/SOURCE, /health/lost/SOURCE, /health/time/VEHICLE, /health/reading/UNIT/VEHICLE/WHAT
-(readings by their unit, so that each plot has one). And two tables for what is read: /health/table/vehicles and
-/health/table/sources.
+Curves for what changes: /health/SOURCE, /health/lost/SOURCE, /health/time/VEHICLE, /health/reading/UNIT/VEHICLE (readings
+by their unit, so that each plot has one; a series each in one entity, because to send an entity costs the same for one
+number as for thirty). And two tables for what is read: /health/table/vehicles and /health/table/sources.
 """
 
 from __future__ import annotations
@@ -33,6 +33,10 @@ class HealthScene:
     def __init__(self) -> None:
         self._sampled = BEFORE_ALL
         self._named: Lately[str] = Lately()
+        self._series: dict[
+            str, dict[str, None]
+        ] = {}  # of each entity of readings: what they are called, in their order
+        self._shown: Lately[str] = Lately(self._series.pop)
         self._tables: dict[str, str] = {}
         self._plans: dict[str, str] = {}  # what each aircraft's plan holds; also those that came from a file
         self._planned: Lately[str] = Lately(self._plans.pop)
@@ -45,7 +49,8 @@ class HealthScene:
             self._take_plans(picture)
             if not 0 <= picture.now - self._sampled < SAMPLE_NS:
                 self._sampled = picture.now
-                samples += _samples(picture)
+                samples += _of_sources(picture)
+                samples += self._of_vehicles(picture)
                 entries += self._changed(picture, VEHICLES, vehicles_table(self._with_plans(picture)))
                 entries += self._changed(picture, SOURCES, sources_table(picture.health.sources))
         return plotted(samples, self._named) + entries
@@ -67,6 +72,29 @@ class HealthScene:
             found.append(vehicle)
         return found
 
+    def _of_vehicles(self, picture: Picture) -> list[Sample]:
+        """What vehicles last said in numbers, and how well their times are known."""
+        samples = []
+        for vehicle in picture.health.vehicles:
+            name = vehicle.aircraft
+            times = {f"{name} {what}, ms": 1e3 * value for what, value in _times_s(vehicle).items()}
+            told = {entity("health", "time", name): times}
+            for reading, value in vehicle.readings:
+                path = entity("health", "reading", unit_part(reading.partition(", ")[2]), name)
+                told.setdefault(path, {})[f"{name} {reading}"] = value
+            samples += [self._sample(picture, path, values) for path, values in told.items()]
+        return [sample for sample in samples if not all(map(math.isnan, sample.values))]
+
+    def _sample(self, picture: Picture, path: str, values: dict[str, float]) -> Sample:
+        """Values by the series that the entity has; what is told for the first time gives it one more."""
+        self._shown.is_new(path, picture.now)
+        series = self._series.setdefault(path, {})
+        if not values.keys() <= series.keys():
+            series.update(dict.fromkeys(values))
+            self._named.drop(path)
+        row = tuple(values.get(name, math.nan) for name in series)
+        return Sample(path, picture.now, picture.step, row, tuple(series))
+
     def _changed(self, picture: Picture, path: str, text: str) -> list[Entry]:
         """A table, if it is not the one that is shown already."""
         known = self._tables.get(path)
@@ -77,7 +105,7 @@ class HealthScene:
         return [*look, once(path, picture.now, picture.step, rr.TextDocument.columns(text=[text]))]
 
 
-def _samples(picture: Picture) -> list[Sample]:
+def _of_sources(picture: Picture) -> list[Sample]:
     told: list[tuple[str, tuple[float, ...], tuple[str, ...]]] = []
     for source in picture.health.sources:
         if source.kind == "pipeline":  # it is no source: it is never silent and loses nothing
@@ -86,16 +114,6 @@ def _samples(picture: Picture) -> list[Sample]:
         heard = (f"{name} last heard, s ago", f"{name} rate, 1/s")
         told.append((entity("health", name), (source.age_s, source.rate_hz), heard))
         told.append((entity("health", "lost", name), (float(source.lost),), (f"{name} lost",)))
-    for vehicle in picture.health.vehicles:
-        name = vehicle.aircraft
-        told += [
-            (entity("health", "time", name, what), (1e3 * value,), (f"{name} {what}, ms",))
-            for what, value in _times_s(vehicle).items()
-        ]
-        for reading, value in vehicle.readings:
-            what, _, unit = reading.partition(", ")
-            path = entity("health", "reading", unit_part(unit), name, what)
-            told.append((path, (value,), (f"{name} {reading}",)))
     return [
         Sample(path, picture.now, picture.step, values, names)
         for path, values, names in told

@@ -13,7 +13,7 @@ from gateway.sinks.scene.lately import Lately
 
 
 class Sample(NamedTuple):
-    """One row of a plot."""
+    """One row of a plot: a value for each series, NaN where it has none now. An entity's series only ever become more."""
 
     path: str
     time: int
@@ -31,8 +31,11 @@ def plotted(samples: Sequence[Sample], named: Lately[str]) -> list[Entry]:
     for path, mine in found.items():
         mine.sort(key=lambda sample: sample.time)
         if named.is_new(path, mine[-1].time):
-            entries.append(Always(path, (rr.SeriesLines(names=mine[0].names),)))
-        values = rr.Scalars.columns(scalars=np.array([sample.values for sample in mine], dtype=np.float64))
+            entries.append(Always(path, (rr.SeriesLines(names=mine[-1].names),)))
+        table = np.full((len(mine), len(mine[-1].names)), np.nan)
+        for row, sample in zip(table, mine, strict=True):
+            row[: len(sample.values)] = sample.values
+        values = rr.Scalars.columns(scalars=table)
         time, step = [sample.time for sample in mine], [sample.step for sample in mine]
         entries.append(rows(path, time, step, values))
     return entries

@@ -49,24 +49,36 @@ def test_health_reaches_the_recording_as_tables_and_curves(tmp_path, pictures):
     assert rows["delay 99 %, ms"] == "300"
     assert rows["landed"] == "in air"
     assert "crc error | 2 |" in entities[SOURCES][-1]["TextDocument:text"][0]
-    assert entities["/health/reading/K/mavlink\\:1/temperature"][-1]["Scalars:scalars"] == [288.0]
-    assert entities["/health/time/mavlink\\:1/clock\\ sigma"][-1]["Scalars:scalars"] == pytest.approx([2.0])
+    assert entities["/health/reading/K/mavlink\\:1"][-1]["Scalars:scalars"] == [288.0]
+    assert entities["/health/time/mavlink\\:1"][-1]["Scalars:scalars"] == pytest.approx([2.0, 10.0, 300.0])
 
 
 def test_what_is_not_known_yet_is_neither_drawn_nor_written(tmp_path, pictures):
     """The made-up clock settles after 5 s."""
     made = pictures(8.0)
     entities = drawn(tmp_path, made)
-    assert entities["/health/time/mavlink\\:1/delay"][0]["utc"] >= made[0].now + 5_000_000_000
+    assert entities["/health/time/mavlink\\:1"][0]["utc"] >= made[0].now + 5_000_000_000
     assert "delay" not in entities[VEHICLES][0]["TextDocument:text"][0]
 
 
 def test_health_is_drawn_at_most_once_a_second_and_a_table_only_when_it_changes(tmp_path, pictures):
     made = [replace(picture, health=Health((), picture.health.vehicles)) for picture in pictures(20.0)]
     entities = drawn(tmp_path, made)
-    assert len(entities["/health/reading/K/mavlink\\:1/temperature"]) == 20
+    assert len(entities["/health/reading/K/mavlink\\:1"]) == 20
     assert len(entities[SOURCES]) == 1
     assert len(entities[VEHICLES]) == len({row["TextDocument:text"][0] for row in entities[VEHICLES]})
+
+
+def test_a_reading_that_is_told_later_gets_a_series_of_its_own_and_moves_no_other(tmp_path, pictures):
+    made = pictures(4.0)
+    (vehicle,) = made[0].health.vehicles
+    rows = []
+    for place, picture in enumerate(made):
+        told = (("speed, m/s", 5.0),) if place < len(made) // 2 else (("climb, m/s", 1.0), ("speed, m/s", 6.0))
+        rows.append(replace(picture, health=Health((), (replace(vehicle, readings=told),))))
+    entities = drawn(tmp_path, rows)
+    values = [row["Scalars:scalars"] for row in entities["/health/reading/mps/mavlink\\:1"]]
+    assert values[0][0] == 5.0 and values[-1] == [6.0, 1.0]
 
 
 def test_when_the_session_goes_back_in_time_health_is_drawn_on(pictures):
