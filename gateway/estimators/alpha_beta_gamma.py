@@ -19,7 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.estimators import source_error
 from gateway.estimators.axis_covariance import PLACES, Terms, Three, carried, reduced, settled, with_velocity
+from gateway.estimators.axis_innovation import Innovation, bounded
 from gateway.estimators.steady_gains import LEAST_RATIO, gains_of, gamma_for, lost_memory, memory
 
 Floats = NDArray[np.float64]
@@ -63,37 +65,7 @@ class Estimate:
     surprises: Floats  # (WINDOW, n, axes) squared residuals over what was expected, latest last
     p: Floats  # (n, axes) their mean within its bounds
     sped_s: Floats  # (n, axes) since a velocity was measured, inf = never
-
-
-@dataclass(frozen=True, slots=True)
-class Innovation:
-    """What measurements told n tracks, component by component (n, m): m is the axes, twice with a velocity.
-
-    The velocity's residuals are those left after the position. Components that were not measured have residual 0 and unit
-    variance, so that they add nothing anywhere.
-    """
-
-    innovation: Floats
-    variance: Floats
-    measured: Bools
-    outlying: Bools  # (n,) so far out, on some axis, that the pull was bounded
-    gamma: Floats  # (n, axes) the gain parameter
-
-    @property
-    def normalised(self) -> Floats:
-        """Squared residuals over their variances, summed, (n,): chi-square with as many degrees as were measured."""
-        return np.asarray((self.innovation * self.innovation / self.variance).sum(axis=-1))
-
-    @property
-    def covariance(self) -> Floats:
-        """The residuals' covariance (n, m, m), diagonal."""
-        return np.asarray(self.variance[..., None] * np.eye(self.variance.shape[-1]))
-
-    @property
-    def log_likelihood(self) -> Floats:
-        """Natural logarithm of the density of the measured components, (n,)."""
-        degrees = self.measured.sum(axis=-1)
-        return np.asarray(-0.5 * (self.normalised + np.log(self.variance).sum(axis=-1) + degrees * np.log(2.0 * np.pi)))
+    error: Floats | None = None  # (5, n, axes) of the position source, as `source_error` keeps it; None = it has none
 
 
 def start(
@@ -123,17 +95,18 @@ def predict(state: Estimate, elapsed_s: Floats) -> Estimate:
     velocity = state.velocity + t * state.acceleration
     position = state.position + (0.5 * t) * (state.velocity + velocity)
     kept = (state.acceleration, state.terms, state.since_s + t, state.density, state.surprises, state.p)
-    return Estimate(position, velocity, *kept, state.sped_s + t)
+    error = None if state.error is None else source_error.carried(state.error, t)
+    return Estimate(position, velocity, *kept, state.sped_s + t, error)
 
 
 def covariance(state: Estimate) -> Floats:
     """The covariance now as matrices (n, axes, 3, 3) over position, velocity, acceleration of each axis."""
-    return np.moveaxis(np.array(_now(state, state.density))[PLACES], (0, 1), (-2, -1))
+    return np.moveaxis(np.array(_whole(state))[PLACES], (0, 1), (-2, -1))
 
 
 def track_covariance(state: Estimate) -> Floats:
     """The covariance now as matrices (n, 2 axes, 2 axes) over the positions and then the velocities; axes are independent."""
-    ss, sv, _, vv, _, _ = _now(state, state.density)
+    ss, sv, _, vv, _, _ = _whole(state)
     axes = ss.shape[-1]
     along = np.arange(axes)
     matrix = np.zeros((*ss.shape[:-1], 2 * axes, 2 * axes))
@@ -142,8 +115,14 @@ def track_covariance(state: Estimate) -> Floats:
     return matrix
 
 
+def _whole(state: Estimate) -> Terms:
+    """The covariance's terms now, each (n, axes), with what the position source's error is not known by."""
+    terms = _now(state, state.density)
+    return terms if state.error is None else source_error.spread(terms, state.error)
+
+
 def _now(state: Estimate, density: Floats) -> Terms:
-    """The covariance's terms now, each (n, axes): those of the last update, over the interval since."""
+    """The filter's own terms now, each (n, axes): those of the last update, over the interval since."""
     # The step grows as p does where gamma is small. A p below 1, of ten residuals, is luck as often as not, and makes
     # nothing surer.
     step = np.square(np.maximum(state.p, 1.0)) * density * state.since_s
@@ -158,11 +137,13 @@ def update(
     velocity: Floats | None = None,
     velocity_sigma: Floats | float = UNKNOWN_SPEED_MPS,
     share: Floats | None = None,
+    by_source: Floats | float = 0.0,
 ) -> tuple[Estimate, Innovation]:
     """States after positions with sigmas (n, axes), and velocities where there are any; NaN components are left out.
 
     `share` (n, axes), in [0, 1]: how much of an axis was measured, where a component of a plot was missing and the
     prediction's own value stands in for it; None = all. What stands in does not make a state surer of itself.
+    `by_source`: 1 where the position has the source's error in it (and in `position` its estimate is taken off), else 0.
     Source: 002-1, sections 1 and 2.2. Deviation: the gain may follow the covariance; `Tuning.follows_covariance`.
     """
     measured = ~np.isnan(position) if share is None else ~np.isnan(position) & (share > 0.0)
@@ -170,6 +151,10 @@ def update(
     y, noise = position - state.position, sigma * sigma
     if not whole:
         y, noise = np.where(measured, y, 0.0), np.where(measured, noise, 1.0)
+    error, off = state.error, None
+    if error is not None:
+        seen = measured.astype(np.float64) if share is None else measured * share
+        off = source_error.Share.of(error, 0, by_source, seen)
     density, interval, q = _calm(state, noise, tuning)
     gamma = np.minimum(np.maximum(state.p * q, LEAST_GAMMA), GREATEST_GAMMA)
     lost = lost_memory(gamma)
@@ -183,32 +168,37 @@ def update(
         s = noise + (prior[0] if share is None else share * cross[0])
         sped = state.sped_s < SPED_S if velocity is None else (state.sped_s < SPED_S) | ~np.isnan(velocity)
         gain = _followed(gain, prior, s if share is None else prior[0] + noise, sped)
-        gain, bounded, outlying = _bounded(gain, s, squared, tuning)
-        terms, expected = reduced(prior, cross, bounded, gain), s
+        whole_s = s if off is None else s + off.variance
+        gain, growth, outlying = bounded(gain, whole_s, squared, tuning.robust)
+        terms, expected = reduced(prior, cross, growth * s, gain), whole_s
     else:
         calm = lost_memory(q)
         most = np.maximum(lost, calm)  # a p below 1 makes nothing surer
-        s, expected = noise / np.square(1.0 - most), noise / np.square(1.0 - calm)
-        gain, _, outlying = _bounded(gain, s, squared, tuning)
+        whole_s, expected = noise / np.square(1.0 - most), noise / np.square(1.0 - calm)
+        if off is not None:
+            whole_s, expected = whole_s + off.variance, expected + off.variance
+        gain, growth, outlying = bounded(gain, whole_s, squared, tuning.robust)
         terms = settled(most, np.maximum(gamma, q), interval, noise)
     learnt = measured if share is None else measured & (share == 1.0)
     surprise = squared / expected
-    told = Innovation(y, s if whole else np.where(measured, s, 1.0), measured, outlying, gamma)
+    if error is not None and off is not None:
+        error, gain = off.told(error, y, growth * whole_s, gain)
+    told = Innovation(y, whole_s if whole else np.where(measured, whole_s, 1.0), measured, outlying, gamma)
     before = (state.position, state.velocity, state.acceleration)
     after = (before[0] + gain[0] * y, before[1] + gain[1] * y, before[2] + gain[2] * y)
     touched, sped_s, axes = measured, state.sped_s, y.shape[1]
     if velocity is not None:
         if not whole:
             terms = np.where(measured, terms, _now(state, density))
-        after, terms, told = _sped(after, terms, velocity, velocity_sigma, told)
-        sped, off = told.measured[:, axes:], told.innovation[:, axes:]
-        surprise = np.where(sped, off * off / told.variance[:, axes:], surprise)  # it shows a manoeuvre sooner
+        after, terms, error, told = _sped(after, terms, error, velocity, velocity_sigma, told, tuning)
+        sped, faster = told.measured[:, axes:], told.innovation[:, axes:]
+        surprise = np.where(sped, faster * faster / told.variance[:, axes:], surprise)  # it shows a manoeuvre sooner
         touched, learnt, sped_s = measured | sped, learnt | sped, np.where(sped, 0.0, sped_s)
     surprises, p, density = _lessons(state, density, surprise, learnt, tuning)
     since = np.zeros_like(y)
     if not touched.all():
         terms, since = np.where(touched, terms, state.terms), np.where(touched, since, state.since_s)
-    return Estimate(*after, terms, since, density, surprises, p, sped_s), told
+    return Estimate(*after, terms, since, density, surprises, p, sped_s, error), told
 
 
 def _followed(steady: Three, prior: Terms, s: Floats, sped: Bools) -> Three:
@@ -227,15 +217,6 @@ def _followed(steady: Three, prior: Terms, s: Floats, sped: Bools) -> Three:
     )
 
 
-def _bounded(gain: Three, s: Floats, squared: Floats, tuning: Tuning) -> tuple[Three, Floats, Bools]:
-    """The gains and residual variances with what pulls too far held back, and which tracks (n,) that concerned."""
-    if tuning.robust is None:
-        return gain, s, np.zeros(len(s), dtype=np.bool_)
-    pull = tuning.robust / np.sqrt(np.maximum(squared / s, tuning.robust**2))
-    outlying = np.asarray((pull < 1.0).any(axis=-1))
-    return (gain[0] * pull, gain[1] * pull, gain[2] * pull), s / (pull * pull), outlying
-
-
 def _calm(state: Estimate, noise: Floats, tuning: Tuning) -> tuple[Floats, Floats, Floats]:
     """The density that holds for the interval, the interval that its gains are taken for (s), and q, all (n, axes)."""
     t = state.since_s
@@ -248,7 +229,7 @@ def _calm(state: Estimate, noise: Floats, tuning: Tuning) -> tuple[Floats, Float
     ratio = state.density * (squares * squares * t) / noise
     if (ratio < LEAST_RATIO**2).any():
         # At almost the same instant gains would not fall with the interval any more, but 1 / T would grow.
-        t = np.maximum(t, (LEAST_RATIO**2 * noise / state.density) ** 0.2)
+        t = np.where(ratio < LEAST_RATIO**2, (LEAST_RATIO**2 * noise / state.density) ** 0.2, t)
         ratio = np.maximum(ratio, LEAST_RATIO**2)
     return state.density, t, gamma_for(ratio)
 
@@ -270,18 +251,35 @@ def _lessons(
 
 
 def _sped(
-    mean: Three, terms: Floats, velocity: Floats, sigma: Floats | float, told: Innovation
-) -> tuple[Three, Floats, Innovation]:
-    """Means and terms (6, n, axes) after velocities too, with the covariance's own gains."""
+    mean: Three,
+    terms: Floats,
+    error: Floats | None,
+    velocity: Floats,
+    sigma: Floats | float,
+    told: Innovation,
+    tuning: Tuning,
+) -> tuple[Three, Floats, Floats | None, Innovation]:
+    """Means, terms (6, n, axes) and source errors after velocities too, with the covariance's own gains."""
     measured = ~np.isnan(velocity)
     y = np.where(measured, velocity - mean[1], 0.0)
-    gain, s, less = with_velocity(terms, np.where(measured, np.square(sigma), 1.0))
+    noise = np.where(measured, np.square(sigma), 1.0)
+    off = None if error is None else source_error.Share.of(error, 1, 0.0, measured.astype(np.float64))
+    s = terms[3] + noise if off is None else terms[3] + noise + off.variance
+    outlying = told.outlying
+    growth: Floats = np.ones_like(s)
+    if tuning.robust is not None:
+        growth = np.maximum(y * y / (s * tuning.robust**2), 1.0)
+        outlying = outlying | np.asarray((growth > 1.0).any(axis=-1))
+        noise = noise + (growth - 1.0) * (terms[3] + noise)
+    gain, _, less = with_velocity(terms, noise)
+    if error is not None and off is not None:
+        error, gain = off.told(error, y, growth * s, gain)
     both = Innovation(
         np.concatenate([told.innovation, y], axis=-1),
         np.concatenate([told.variance, np.where(measured, s, 1.0)], axis=-1),
         np.concatenate([told.measured, measured], axis=-1),
-        told.outlying,
+        outlying,
         told.gamma,
     )
     after = (mean[0] + gain[0] * y, mean[1] + gain[1] * y, mean[2] + gain[2] * y)
-    return after, np.where(measured, less, terms), both
+    return after, np.where(measured, less, terms), error, both

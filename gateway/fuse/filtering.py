@@ -12,6 +12,7 @@ from gateway.estimators.kalman import Estimate
 from gateway.fuse.agreement import score_after
 from gateway.fuse.estimating import Estimator, Group, InteractingModels, SingleModel, stacked
 from gateway.fuse.events import NEVER, Belief, Event, Job, Measure, Near, Neighbour, rank
+from gateway.fuse.light import LightFilter
 from gateway.fuse.weighting import Model
 
 __all__ = ["NEVER", "Event", "Job", "Measure", "Near", "Neighbour", "carried_on", "directions", "rank", "run"]
@@ -35,6 +36,8 @@ def run(jobs: Sequence[Job], model: Model) -> list[list[Event]]:
 
 def estimator_of(model: Model) -> Estimator:
     """The estimator that a model asks for."""
+    if model.light is not None:
+        return LightFilter(model, model.light)
     return SingleModel(model) if model.modes is None else InteractingModels(model, model.modes)
 
 

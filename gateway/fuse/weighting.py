@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.align import Local
+from gateway.estimators.alpha_beta_gamma import Tuning
 from gateway.estimators.kalman import ERROR, POSITION, SIZE, VELOCITY, Estimate, Innovation, Motion, start, update
 from gateway.estimators.modes import Mode, Modes
 from gateway.frames import RadarFrame, polar_from_xyz, polar_jacobian, xyz_from_polar
@@ -35,6 +36,9 @@ MANOEUVRE_SHARE = 0.5  # of the one model's density: turns are modes of their ow
 CALM_TIME, MANOEUVRE_TIME, TURN_TIME = 6.0, 2.0, 1.0  # how much of its time an aircraft flies so, against each other
 MODE_LASTS_S = 6.0
 
+# Three sigmas for each degree of freedom, for the three of a position: all of them may lie in one axis.
+LIGHT = Tuning(robust=math.sqrt(3.0) * ROBUST_SIGMA)
+
 AXES = np.arange(3)
 
 # What a GPS report measures of the state: position (and, where the source may be wrong, its error), and velocity.
@@ -51,6 +55,7 @@ class Model:
     radars: Mapping[int, RadarFrame]
     modes: Modes | None = None  # with them, states come as rows of `together` guesses at each track
     confirm_score: float = math.log(1e4)  # logarithm of the odds that confirm a track
+    light: Tuning | None = None  # of the alpha-beta-gamma filter, which asks nothing of `motion` but the source's error
 
     @classmethod
     def of(cls, options: Options, position: PositionSource, radars: Mapping[int, RadarFrame]) -> Model:
@@ -59,7 +64,9 @@ class Model:
         upright = options.vertical_acceleration_sigma_mps2**2 * options.acceleration_time_s
         error = position.systematic_m / math.sqrt(3.0) if options.weighting == "bias" else 0.0
         motion = Motion((level, level, upright), error)
-        return cls(options.weighting, motion, radars, modes_of(options, motion), math.log(options.confirm_odds))
+        confirm_score = math.log(options.confirm_odds)
+        light = LIGHT if options.estimator == "alpha-beta-gamma" else None
+        return cls(options.weighting, motion, radars, modes_of(options, motion), confirm_score, light)
 
     @property
     def together(self) -> int:
@@ -78,7 +85,7 @@ def modes_of(options: Options, motion: Motion) -> Modes | None:
     Straight flight comes in two: calm, in which noise is taken off best, and with changes of speed, climb or course that are
     no full turn.
     """
-    if options.estimator == "kalman":
+    if options.estimator == "kalman" or options.estimator == "alpha-beta-gamma":
         return None
     east, north, up = motion.acceleration_density
     straying = (MANOEUVRE_SHARE * east, MANOEUVRE_SHARE * north, MANOEUVRE_SHARE * up)
@@ -252,11 +259,24 @@ def update_literally(
 ) -> tuple[Estimate, Innovation]:
     """States after GPS reports (n, 3) with the radar's plot at the same time, as printed.
 
+    Source: 003 2.4 eq 11 to 14, 17 to 20.
+    """
+    fused, variance, jacobian = weigh_literally(state.mean[:, POSITION], position, position_sigma, polar, sigma, frame)
+    sensitivity = np.zeros((len(polar), 3, SIZE))
+    sensitivity[:, :, POSITION] = jacobian
+    return update(state, fused, sensitivity, variance, ROBUST_SIGMA, together)
+
+
+def weigh_literally(
+    predicted: Floats, position: Floats, position_sigma: Floats, polar: Floats, sigma: Floats, frame: RadarFrame
+) -> tuple[Floats, Floats, Floats]:
+    """Residuals in range, azimuth and elevation (n, 3), their variances, and their derivatives by the position (n, 3, 3).
+
     Each component's weight is the inverse square of that source's residual; the noise is weighed likewise; where the radar
     gives nothing the position source stands alone.
-    Source: 003 2.4 eq 11 to 14, 17 to 20. Deviation: a residual below 1e-3 sigma counts as that.
+    Source: 003 2.4 eq 11 to 14. Deviation: a residual below 1e-3 sigma counts as that.
     """
-    xyz = frame.from_enu(state.mean[:, POSITION])
+    xyz = frame.from_enu(predicted)
     expected = polar_from_xyz(xyz)
     jacobian = polar_jacobian(xyz) @ frame.radar_from_enu
     gps = polar_from_xyz(frame.from_enu(position))
@@ -269,9 +289,7 @@ def update_literally(
     both = ~np.isnan(by_radar)
     fused = np.where(both, (weight_radar * by_radar + weight_gps * by_gps) / total, by_gps)
     variance = np.where(both, (weight_radar * radar_variance + weight_gps * gps_variance) / total, gps_variance)
-    sensitivity = np.zeros((len(polar), 3, SIZE))
-    sensitivity[:, :, POSITION] = jacobian
-    return update(state, fused, sensitivity, variance, ROBUST_SIGMA, together)
+    return fused, variance, jacobian
 
 
 def polar_difference(one: Floats, other: Floats) -> Floats:

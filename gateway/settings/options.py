@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 Weighting = Literal["bias", "covariance", "innovation", "literal"]
-EstimatorName = Literal["kalman", "imm", "rmimm"]
+EstimatorName = Literal["kalman", "imm", "rmimm", "alpha-beta-gamma"]
 AssociationRule = Literal["default", "literal"]
 MutedSource = Literal["gps", "radar"]
 
@@ -29,7 +29,7 @@ class Mute:
 class Options:
     """What may be chosen for a run; everything in here changes numbers, so all of it is archived."""
 
-    estimator: EstimatorName = "kalman"  # constant velocity alone, or straight and turns as interacting modes
+    estimator: EstimatorName = "kalman"  # constant velocity, straight and turns as interacting modes, or the light filter
     weighting: Weighting = "bias"
     association: AssociationRule = "default"
     acceleration_sigma_mps2: float = 2.0  # of the constant-velocity model, east and north

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gateway.estimators.alpha_beta_gamma import Estimate, Tuning, covariance, predict, start, track_covariance, update
 from gateway.estimators.axis_covariance import settled
 from gateway.estimators.completed_plots import completed
+from gateway.estimators.source_error import begun
 from gateway.estimators.steady_gains import lost_memory
 from gateway.frames import RadarFrame, RunwayFrame, polar_from_xyz
 from sim.cases import case_003
@@ -25,7 +26,8 @@ TUNINGS = (Tuning(), Tuning(robust=3.0), Tuning(follows_covariance=False), Tunin
 
 def _tracks(n: int, rng: np.random.Generator, tuning: Tuning) -> Estimate:
     speed = np.where(rng.random((n, 3)) < 0.3, np.nan, 100.0 * rng.standard_normal((n, 3)))
-    return start(1e4 * rng.standard_normal((n, 3)), rng.uniform(1.0, 100.0, (n, 3)), tuning, speed, 2.0)
+    state = start(1e4 * rng.standard_normal((n, 3)), rng.uniform(1.0, 100.0, (n, 3)), tuning, speed, 2.0)
+    return replace(state, error=begun(rng.integers(0, 2, (n, 3)).astype(np.float64), 30.0))
 
 
 def _worked(state: Estimate, steps: list[tuple[Floats, ...]], tuning: Tuning) -> Estimate:
