@@ -28,6 +28,8 @@ Examples:
 
   talkdown live --mavlink udpin:0.0.0.0:14550 --radar udpin:0.0.0.0:30070 --site field.toml --archive sessions
 
+  talkdown live --mavlink udpin:0.0.0.0:14550 --estimator alpha-beta-gamma
+
   talkdown live --mavlink tcp:127.0.0.1:5760 --heartbeat --request-rates --fetch-mission --viewer web
 
   talkdown live --mavlink serial:/dev/ttyUSB0:57600 --key link.key --publish udpout:127.0.0.1:14551

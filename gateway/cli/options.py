@@ -30,6 +30,7 @@ class Estimator(StrEnum):
     kalman = "kalman"
     imm = "imm"
     rmimm = "rmimm"
+    alpha_beta_gamma = "alpha-beta-gamma"
 
 
 class Weighting(StrEnum):
@@ -83,7 +84,9 @@ ArchiveOption = Annotated[
 EstimatorOption = Annotated[
     Estimator,
     typer.Option(
-        "--estimator", help="How tracks move: kalman at constant velocity; imm and rmimm tell straight and turns apart."
+        "--estimator",
+        help="How tracks move: kalman at constant velocity; imm and rmimm tell straight and turns apart; "
+        "alpha-beta-gamma, at constant acceleration, is the light one.",
     ),
 ]
 WeightingOption = Annotated[

@@ -34,6 +34,8 @@ Examples:
 
   talkdown replay flight.tlog radar.pcap --mute gps:60:90 --mute radar:1:100:120
 
+  talkdown replay flight.tlog --estimator alpha-beta-gamma
+
   talkdown replay three-planes.tlog --plan mavlink:2=circuit.plan
 
   talkdown replay sessions/20260301T120000Z-demo-field --viewer none --json
