@@ -80,13 +80,13 @@ def predict(state: Estimate, elapsed_s: Floats, motion: Motion) -> Estimate:
     if len(elapsed_s) == 1:  # one track worked again after late data sees the same intervals again
         carry, noise = _over(motion, float(elapsed_s[0]))
     else:
-        carry, noise = _carried(motion, elapsed_s)
+        carry, noise = carried(motion, elapsed_s)
     mean = (carry @ state.mean[:, :, None])[:, :, 0]
     return Estimate(mean, carry @ state.covariance @ carry.transpose(0, 2, 1) + noise)
 
 
-def _carried(motion: Motion, elapsed_s: Floats) -> tuple[Floats, Floats]:
-    """Transition and noise matrices (n, 9, 9) over times (n,)."""
+def carried(motion: Motion, elapsed_s: Floats) -> tuple[Floats, Floats]:
+    """Transition and noise matrices (n, 9, 9) over times (n,), not negative."""
     t = elapsed_s[:, None, None]
     keep = np.exp(t / -motion.error_time_constant_s)
     return _UNCHANGED + t * _VELOCITY_MOVES + keep * _ERROR_STAYS, motion.noise(t, keep)
@@ -95,7 +95,7 @@ def _carried(motion: Motion, elapsed_s: Floats) -> tuple[Floats, Floats]:
 @lru_cache(maxsize=4096)
 def _over(motion: Motion, elapsed_s: float) -> tuple[Floats, Floats]:
     """The same over one time, remembered; nobody may write into them."""
-    carry, noise = _carried(motion, np.array([elapsed_s]))
+    carry, noise = carried(motion, np.array([elapsed_s]))
     carry.setflags(write=False)
     noise.setflags(write=False)
     return carry, noise

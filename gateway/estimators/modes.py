@@ -225,14 +225,19 @@ def predict(mixture: Mixture, elapsed_s: Floats, modes: Modes, transition: Float
     mean, covariance = mixture.mean, mixture.covariance
     if modes.count > 1:
         mean, covariance = _matched(joint / weight[:, None], mean, covariance)
-    level = (weight[:, None, :] @ mean[:, :, 3:5])[:, 0]
-    rate = modes.turn_rate(np.sqrt(level[:, 0] * level[:, 0] + level[:, 1] * level[:, 1]))
-    carry, noise = carried([mode.motion for mode in modes.modes], elapsed_s, rate)
+    carry, noise = moved(mean, weight, elapsed_s, modes)
     mean = (carry @ mean[..., None])[..., 0]
     covariance = carry @ covariance @ carry.swapaxes(-1, -2) + noise
     covariance = 0.5 * (covariance + covariance.swapaxes(-1, -2))
     passed_s = mixture.elapsed_s + elapsed_s
     return Mixture(mean, covariance, weight, mixture.score, mixture.information, mixture.recent, passed_s)
+
+
+def moved(mean: Floats, weight: Floats, elapsed_s: Floats, modes: Modes) -> tuple[Floats, Floats]:
+    """Transition and noise (n, m, 9, 9) over times (n,) of modes that have mixed: means (n, m, 9), weights (n, m)."""
+    level = (weight[:, None, :] @ mean[:, :, 3:5])[:, 0]
+    rate = modes.turn_rate(np.sqrt(level[:, 0] * level[:, 0] + level[:, 1] * level[:, 1]))
+    return carried([mode.motion for mode in modes.modes], elapsed_s, rate)
 
 
 def held(mixture: Mixture, elapsed_s: Floats, modes: Modes) -> Estimate:
