@@ -9,7 +9,7 @@ from gateway import align, associate, fuse, predict, track
 from gateway.align import SECOND, Fix, Geoid, Plot
 from gateway.associate import Association, Change, Setting
 from gateway.frames import RadarFrame
-from gateway.fuse import Ended, Lanes, Scene
+from gateway.fuse import Ended, Lanes, LifeChange, Scene
 from gateway.fuse.filtering import Job
 from gateway.fuse.rows import Row
 from gateway.fuse.weighting import Model
@@ -45,6 +45,7 @@ class Work:
         self.changes: list[Change] = []
         self.rows: list[Row] = []
         self.ended: list[Ended] = []
+        self.lived: list[LifeChange] = []
         self.forecasts: list[predict.Forecast] = []
         self.events: list[Event] = []
         self.jobs: dict[int, Job] = {}
@@ -75,7 +76,10 @@ class Work:
         self._settle()
         lanes, ended = fuse.end_silent(self.lanes, at, self.options)
         self.ended += ended
-        self.events += [Event(at, "info", f"track {end.track} ended: {end.reason}") for end in ended]
+        self.events += [Event(at, "info", f"track {end.track} ended: {end.reason}") for end in ended if not end.quiet]
+        lanes, lived = fuse.told(lanes, at, self.options)
+        self.lived += lived
+        self.events += [Event(at, "info", text) for one in lived if (text := fuse.sentence(one, lanes)) is not None]
         alive = [lane for lane in lanes.lanes.values() if lane.ended_at is None and lane.events]
         silent = [lane for lane in alive if lane.coasting_at(at, self.options)]
         spans = self.association.ledger.spans
@@ -348,7 +352,7 @@ class Work:
             track=track.table(self.tracks, self.untracked),
             associate=associate.table(self.checks, self.association.ledger, self.changes),
             register=self.registration.table(self.radars),
-            fuse=fuse.table(self.rows, self.ended, self.frame, self.model),
+            fuse=fuse.table(self.rows, self.ended, self.lived, self.frame, self.model),
             predict=predict.table(self.forecasts, self.frame),
             truth=tuple(observation for observation in observations if isinstance(observation, Truth)),
             health=replace(health, sources=(*health.sources, own)),

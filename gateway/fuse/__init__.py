@@ -1,11 +1,12 @@
 """Fuse: one state for each aircraft from everything that saw it (paper 003, 2.4).
 
-`lanes` holds the system tracks and their recent past; `placing` puts measurements into it, late ones where they belong;
-`filtering` runs the filter over many tracks at once; `weighting` holds the four ways to weigh a position source against a
-radar; `rows` makes the result.
+`lanes` holds the system tracks and their recent past; `life` begins, confirms and ends them (`agreement` is its test);
+`placing` puts measurements into them, late ones where they belong; `filtering` runs the filter over many tracks at once;
+`weighting` holds the four ways to weigh a position source against a radar; `rows` makes the result.
 """
 
-from gateway.fuse.lanes import Ended, Lane, Lanes, contains, emptied, end_silent, joined
+from gateway.fuse.lanes import Ended, Lane, Lanes, contains, emptied, joined
+from gateway.fuse.life import LifeChange, end_silent, sentence, told
 from gateway.fuse.placing import Scene, lane_of, reroute, take_fix, take_plot
 from gateway.fuse.rows import Fused, Row, coast, knows_height, table, work
 
@@ -14,6 +15,7 @@ __all__ = [
     "Fused",
     "Lane",
     "Lanes",
+    "LifeChange",
     "Row",
     "Scene",
     "coast",
@@ -24,8 +26,10 @@ __all__ = [
     "knows_height",
     "lane_of",
     "reroute",
+    "sentence",
     "table",
     "take_fix",
     "take_plot",
+    "told",
     "work",
 ]

@@ -25,6 +25,8 @@ class Lane:
     whole: bool = True  # nothing of its past was forgotten yet
     ended_at: int | None = None
     emptied_at: int = 0  # when its past was forgotten
+    origin: str = ""  # how it began, for people
+    told: str = ""  # the part of its life that was last told
 
     @property
     def last(self) -> Event:
@@ -34,7 +36,16 @@ class Lane:
     def with_events(self, events: tuple[Event, ...]) -> Lane:
         """The same with another past. Written out: on the hot path `dataclasses.replace` would cost four times this."""
         return Lane(
-            self.track, self.aircraft, self.key, self.ordinal, events, self.whole, self.ended_at, self.emptied_at
+            self.track,
+            self.aircraft,
+            self.key,
+            self.ordinal,
+            events,
+            self.whole,
+            self.ended_at,
+            self.emptied_at,
+            self.origin,
+            self.told,
         )
 
     def coasting_at(self, at: int, options: Options) -> bool:
@@ -45,36 +56,57 @@ class Lane:
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """A system track that is no more, and why."""
+    """A system track that is no more, and why. `quiet`: it never was more than tentative, and nobody need be told."""
 
     at: int
     track: int
     reason: str
+    quiet: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Gone:
+    """An aircraft's track that ended: what its number can be given back by, while the aircraft may come back."""
+
+    track: int
+    at: int  # of its last state
+    ended_at: int
+    enu_m: tuple[float, ...]  # (3,) where that was
+    event: Event | None  # that state; forgotten when no late data can go on from it any more
 
 
 @dataclass(frozen=True, slots=True)
 class Lanes:
-    """All system tracks; track numbers count from 1 and are never used again."""
+    """All system tracks; track numbers count from 1, and none is ever given to something else."""
 
     lanes: Mapping[int, Lane] = field(default_factory=dict)
     by_aircraft: Mapping[str, int] = field(default_factory=dict)
     by_key: Mapping[tuple[Key, int], int] = field(default_factory=dict)
     next_track: int = 1
+    gone: Mapping[str, Gone] = field(default_factory=dict)  # of aircraft whose track ended, the latest last
 
     def with_lane(self, lane: Lane) -> Lanes:
         """The same with one lane put in place of its former self."""
-        return Lanes({**self.lanes, lane.track: lane}, self.by_aircraft, self.by_key, self.next_track)
+        return self.with_lanes({lane.track: lane})
 
     def with_lanes(self, lanes: Mapping[int, Lane]) -> Lanes:
         """The same with some lanes put in place of their former selves."""
-        return Lanes({**self.lanes, **lanes}, self.by_aircraft, self.by_key, self.next_track)
+        return Lanes({**self.lanes, **lanes}, self.by_aircraft, self.by_key, self.next_track, self.gone)
 
-    def begun(self, aircraft: str | None, key: Key | None, ordinal: int) -> tuple[Lanes, Lane]:
+    def begun(self, aircraft: str | None, key: Key | None, ordinal: int, origin: str) -> tuple[Lanes, Lane]:
         """The same with a new lane of the next number."""
-        lane = Lane(self.next_track, aircraft, key, ordinal)
-        by_aircraft = {**self.by_aircraft, aircraft: lane.track} if aircraft is not None else self.by_aircraft
-        by_key = {**self.by_key, (key, ordinal): lane.track} if key is not None else self.by_key
-        return Lanes({**self.lanes, lane.track: lane}, by_aircraft, by_key, self.next_track + 1), lane
+        lane = Lane(self.next_track, aircraft, key, ordinal, origin=origin)
+        return replace(self.added(lane), next_track=self.next_track + 1), lane
+
+    def added(self, lane: Lane) -> Lanes:
+        """The same with a lane that is found by its aircraft, or its radar track; what is known of its end is forgotten."""
+        by_aircraft, by_key, gone = self.by_aircraft, self.by_key, self.gone
+        if lane.aircraft is not None:
+            by_aircraft = {**by_aircraft, lane.aircraft: lane.track}
+            gone = {aircraft: one for aircraft, one in gone.items() if aircraft != lane.aircraft} if gone else gone
+        if lane.key is not None:
+            by_key = {**by_key, (lane.key, lane.ordinal): lane.track}
+        return Lanes({**self.lanes, lane.track: lane}, by_aircraft, by_key, self.next_track, gone)
 
     def without(self, tracks: Iterable[int]) -> Lanes:
         """The same without some tracks."""
@@ -84,6 +116,7 @@ class Lanes:
             {aircraft: track for aircraft, track in self.by_aircraft.items() if track not in gone},
             {key: track for key, track in self.by_key.items() if track not in gone},
             self.next_track,
+            self.gone,
         )
 
     def pruned(self, before: int) -> Lanes:
@@ -106,20 +139,6 @@ def contains(lanes: Lanes, track: int | None, plot: Plot) -> bool:
         if event.at < plot.at:
             return False
     return False
-
-
-def end_silent(lanes: Lanes, at: int, options: Options) -> tuple[Lanes, list[Ended]]:
-    """The lanes without those that have been silent for too long, and without those that joined another long ago."""
-    limit, history = int(options.end_after_s * SECOND), int(options.history_s * SECOND)
-    ended, gone = [], []
-    for lane in lanes.lanes.values():
-        if lane.ended_at is not None:
-            if lane.ended_at < at - history:
-                gone.append(lane.track)
-        elif at - (lane.last.at if lane.events else lane.emptied_at) > limit:
-            gone.append(lane.track)
-            ended.append(Ended(at, lane.track, f"no data for {options.end_after_s:.0f} s"))
-    return (lanes.without(gone), ended) if gone else (lanes, ended)
 
 
 def joined(lanes: Lanes, spans: Sequence[Span]) -> tuple[Lanes, list[Ended]]:
@@ -148,7 +167,7 @@ def emptied(lanes: Lanes, at: int) -> tuple[Lanes, list[Ended]]:
         for track, lane in lanes.lanes.items()
         if lane.key is not None and lane.ended_at is None
     ]
-    return replace(lanes, lanes=kept, by_key={}), ended
+    return replace(lanes, lanes=kept, by_key={}, gone={}), ended
 
 
 def joined_at(lane: Lane, spans: Sequence[Span]) -> tuple[int, str] | None:

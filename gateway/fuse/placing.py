@@ -17,8 +17,9 @@ from gateway.align import SECOND, Fix, Plot, bracket
 from gateway.associate import Span, aircraft_of, ordinal_of
 from gateway.fuse.filtering import Job, Measure, Near, Neighbour, rank
 from gateway.fuse.lanes import Lane, Lanes
+from gateway.fuse.life import lane_of_report
 from gateway.settings import Options
-from gateway.track import Key, RadarTracks
+from gateway.track import Key, RadarTracks, name_of
 
 LEAST_PLOTS = 3  # before a radar track that nobody claims becomes a system track
 COMPLETED_WITHIN_S = 1.6  # components of neighbouring plots this close may complete the first one
@@ -53,11 +54,10 @@ class Scene:
 def take_fix(lanes: Lanes, fix: Fix, scene: Scene) -> tuple[Lanes, Job | None]:
     """The lanes with a GPS report in its aircraft's, and what is to be worked; no job means that it came too late."""
     track = lanes.by_aircraft.get(fix.aircraft)
-    if track is None:
-        lanes, lane = lanes.begun(fix.aircraft, None, 0)
-    else:
-        lane = lanes.lanes[track]
-    return _inserted(lanes, lane, fix, scene)
+    if track is not None:
+        return _inserted(lanes, lanes.lanes[track], fix, scene)
+    lanes, lane = lane_of_report(lanes, fix, scene.options)
+    return _inserted(lanes, lane, fix, scene) if lane is not None else (lanes, None)
 
 
 def take_plot(lanes: Lanes, plot: Plot, key: Key, scene: Scene) -> tuple[Lanes, Job | None]:
@@ -168,7 +168,7 @@ def _begun_from_plots(lanes: Lanes, key: Key, ordinal: int, scene: Scene) -> tup
     measures = begin(_free_plots(Lane(0, None, key, ordinal), scene))
     if not measures:
         return lanes, None
-    lanes, lane = lanes.begun(None, key, ordinal)
+    lanes, lane = lanes.begun(None, key, ordinal, f"radar track {name_of(key)}, seen for the first time")
     return lanes, Job(lane.track, None, measures, scene.neighbour(lane))
 
 

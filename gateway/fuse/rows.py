@@ -13,8 +13,10 @@ from gateway.align import SECOND, Fix
 from gateway.associate import Span
 from gateway.estimators.kalman import ERROR, POSITION, SIZE, VELOCITY
 from gateway.frames import RunwayFrame, turn
+from gateway.fuse.agreement import CONFIRMED
 from gateway.fuse.filtering import NEVER, Event, Job, carried_on, directions, run
 from gateway.fuse.lanes import Ended, Lane, Lanes, radar_names
+from gateway.fuse.life import LifeChange
 from gateway.fuse.weighting import Model
 
 Floats = NDArray[np.float64]
@@ -49,7 +51,9 @@ class Fused:
     bias_m: Floats  # (n, 3) estimated error of the position source, east north up; NaN = none
     pressure_altitude_m: Floats  # as last reported; NaN = not in the last seconds
     callsign: tuple[str | None, ...]
+    life: tuple[str, ...]  # "tentative", "confirmed", "coasting"
     ended: tuple[Ended, ...] = ()
+    lived: tuple[LifeChange, ...] = ()  # which began, were confirmed, or coast, and why
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +72,7 @@ class Row:
     separation_m: float  # of the geoid, as it was known then
     event: Event  # what the row was made of
     modes: Floats  # (3,) straight, left, right; NaN = the estimator has none
+    life: str
 
 
 def row_of(lane: Lane, event: Event, spans: Sequence[Span], separation_m: float, model: Model) -> Row:
@@ -91,6 +96,7 @@ def row_of(lane: Lane, event: Event, spans: Sequence[Span], separation_m: float,
         separation_m,
         event,
         directions(event, model),
+        "confirmed" if event.score == CONFIRMED else "tentative",
     )
 
 
@@ -129,6 +135,7 @@ def coast(lanes: Sequence[Lane], at: int, spans: Sequence[Span], separation_m: f
             separation_m,
             lane.last,
             flown[i],
+            "coasting" if lane.last.score == CONFIRMED else "tentative",
         )
         for i, lane in enumerate(lanes)
     ]
@@ -148,7 +155,9 @@ def _pressure_altitude_m(row: Row) -> float:
     return told.pressure_altitude_m
 
 
-def table(rows: Sequence[Row], ended: Sequence[Ended], frame: RunwayFrame, model: Model) -> Fused:
+def table(
+    rows: Sequence[Row], ended: Sequence[Ended], lived: Sequence[LifeChange], frame: RunwayFrame, model: Model
+) -> Fused:
     """Rows as columns, in geodetic coordinates and with velocity and covariance along the axes at each point."""
     n = len(rows)
     mean = np.array([row.mean for row in rows]).reshape(n, SIZE)
@@ -184,5 +193,7 @@ def table(rows: Sequence[Row], ended: Sequence[Ended], frame: RunwayFrame, model
         bias_m=np.where(known & has_error, mean[:, ERROR], math.nan),
         pressure_altitude_m=np.array([_pressure_altitude_m(row) for row in rows]).reshape(n),
         callsign=tuple(row.event.callsign for row in rows),
+        life=tuple(row.life for row in rows),
         ended=tuple(ended),
+        lived=tuple(lived),
     )

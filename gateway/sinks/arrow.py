@@ -49,6 +49,7 @@ TRACKS = pa.schema(
         ("right", _REAL),
         ("pressure_altitude_m", _REAL),  # never a height: it stands beside one, or where there is none
         ("callsign", _TEXT),
+        ("life", _TEXT),
     ]
 )
 
@@ -110,6 +111,7 @@ def tracks_batch(parts: Sequence[Fused]) -> pa.RecordBatch:
         *(_real(modes[:, mode]) for mode in range(3)),
         _real(np.concatenate([part.pressure_altitude_m for part in parts])),
         _text([part.callsign for part in parts]),
+        _text([part.life for part in parts]),
     ]
     return pa.RecordBatch.from_arrays(columns, schema=TRACKS)
 
@@ -225,6 +227,7 @@ class ArrowSink:
         self._rows_limit = rows_limit
         self._rows = 0
         self._flushed_at: int | None = None
+        self._refused = False  # the disk did not take something, which was told
         self._tracks: _Table[Fused] = _Table(folder, "tracks", tracks_batch)
         self._predictions: _Table[Predicted] = _Table(folder, "predictions", predictions_batch)
         self._truth: _Table[Truth] = _Table(folder, "truth", lambda rows: truth_batch(rows, geoid_separation_m))
@@ -246,18 +249,26 @@ class ArrowSink:
         if self._rows >= self._rows_limit or now - self._flushed_at >= self._period_ns:
             self._flushed_at = now
             self._rows = 0
-            for table in (self._tracks, self._predictions, self._truth):
-                table.flush()
+            try:
+                for table in (self._tracks, self._predictions, self._truth):
+                    table.flush()
+            except OSError:
+                self._refused = True
+                raise
 
     def close(self) -> None:
-        """Write out everything and end the streams; calling it again does nothing."""
+        """Write out everything and end the streams; calling it again does nothing. A full disk is told once."""
         try:
-            self._tracks.close()
-        finally:
             try:
-                self._predictions.close()
+                self._tracks.close()
             finally:
-                self._truth.close()
+                try:
+                    self._predictions.close()
+                finally:
+                    self._truth.close()
+        except OSError:
+            if not self._refused:
+                raise
 
     def __enter__(self) -> ArrowSink:
         return self

@@ -3,7 +3,8 @@
 What is told of a track is the last state that a measurement gave it, never one that was only carried on: a receiver
 takes a report for what was so `tslc` whole seconds ago, and carries it on itself. Our states are not whole seconds old:
 each is carried on by the fraction of a second that is missing, so that what is told is exactly true of that instant.
-A track that is silent grows old in this way, and is told no more when it ends.
+A track that is silent grows old in this way, and is told no more when it ends. A tentative track is not told: to others
+it would be an aircraft like any other.
 
 Our component is one of the system that is looked at: QGroundControl and MAVSDK take traffic only from a system that they
 know as a vehicle, which most have as system 1. So the number of that vehicle is the one to publish as.
@@ -109,13 +110,15 @@ class PublishSink:
                 self._simulated[f"{one.radar}/{one.track_number}"] = one.valid_at
 
     def _keep(self, fused: Fused, now: int) -> None:
-        """The newest measured row of each track; tracks that ended go."""
+        """The newest measured row of each track that is, or was, confirmed; tracks that ended go."""
         for row, (track, at, received) in enumerate(
             zip(fused.track.tolist(), fused.time.tolist(), fused.received.tolist(), strict=True)
         ):
             if received < 0:
                 continue
             told = self._tracks.get(track)
+            if told is None and fused.life[row] == "tentative":
+                continue
             if told is None:
                 self._tracks[track] = _Told(fused, row, now + int(track * _SPREAD % 1.0 * _SECOND))
             elif at >= told.fused.time[told.row]:

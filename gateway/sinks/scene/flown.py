@@ -46,6 +46,7 @@ class Flown:
     callsign: tuple[str | None, ...]
     radar_track: tuple[str | None, ...]
     state: tuple[str, ...]
+    life: tuple[str, ...]
 
 
 class Flights:
@@ -84,7 +85,7 @@ class Flights:
         pressure = column("pressure_altitude_m")
         covariance, modes, bias = column("covariance"), column("modes"), column("bias_m")
         aircraft, radar_track, state = text("aircraft"), text("radar_track"), text("state")
-        callsign = text("callsign")
+        callsign, life = text("callsign"), text("life")
         whole = np.isfinite(place).all(axis=1)
         found = []
         for number in dict.fromkeys(track.tolist()):
@@ -102,6 +103,7 @@ class Flights:
                     tuple(callsign[row] for row in index),
                     tuple(radar_track[row] for row in index),
                     tuple(str(state[row]) for row in index),
+                    tuple(str(life[row]) for row in index),
                 )
             )  # fmt: skip
         return found

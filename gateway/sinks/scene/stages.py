@@ -109,7 +109,7 @@ class StageScene:
         entries: list[Entry] = []
         for ended in picture.fuse.ended:
             text = f"track {ended.track} ended: {ended.reason}"
-            if not any(f"track {ended.track} ended" in event.text for event in picture.events):
+            if not (ended.quiet or any(f"track {ended.track} ended" in event.text for event in picture.events)):
                 log.append((ended.at, picture.step, text, "info"))
             gone = max(ended.at, picture.now, newest(ended.track))  # the last rows can be newer than the reason to end
             paths = [entity(root, ended.track) for root in ("fuse", "predict", "approach")]

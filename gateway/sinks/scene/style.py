@@ -28,6 +28,9 @@ GLIDE_PATH: Colour = (70, 200, 120)
 COVERAGE: Colour = (45, 80, 130)
 DECISION: Colour = (255, 230, 80)
 
+TENTATIVE: Colour = (130, 70, 70)  # a fused track that may be nothing: dim
+COASTING: Colour = (200, 110, 110)
+
 STATES: dict[str, Colour] = {
     "gps only": GPS,
     "radar only": RADAR,
@@ -35,6 +38,7 @@ STATES: dict[str, Colour] = {
     "coasting": (130, 130, 130),
     "ended": (60, 60, 60),
 }
+LIVES: dict[str, Colour] = {"tentative": TENTATIVE, "confirmed": FUSED, "coasting": COASTING}
 AXES: tuple[Colour, Colour, Colour] = ((235, 110, 90), (110, 200, 110), (110, 150, 240))  # as everywhere: x, y, z
 HORIZONTAL: Colour = (190, 120, 255)
 VERTICAL: Colour = (70, 200, 190)

@@ -80,13 +80,12 @@ class TrackScene:
         self._drawn.pop(track, None)
 
     def _looks(self, track: int) -> list[Entry]:
-        """Colours, sizes and names: what is the same in every row."""
+        """Sizes, names, and colours of lines: what is the same in every row."""
         path, units = entity("fuse", track), self._units
         corners = np.array(_CORNERS).reshape(-1, 3)
         symbol = rr.Mesh3D(
             vertex_positions=corners,
             triangle_indices=np.arange(12).reshape(4, 3),
-            albedo_factor=style.FUSED,
         )
         names = [f"track {track} speed, {units.speed}", f"track {track} sink rate, {units.climb}"]
         states = list(style.STATES)
@@ -94,8 +93,8 @@ class TrackScene:
             Always(
                 path,
                 (
-                    rr.Points3D.from_fields(colors=style.FUSED, radii=style.points(2.5)),
-                    rr.GeoPoints.from_fields(colors=style.FUSED, radii=style.points(5.0)),
+                    rr.Points3D.from_fields(radii=style.points(2.5)),
+                    rr.GeoPoints.from_fields(radii=style.points(5.0)),
                     rr.SeriesLines(names=names, colors=[style.HORIZONTAL, style.VERTICAL]),
                 ),
             ),
@@ -109,7 +108,7 @@ class TrackScene:
             ),
             Always(
                 f"{path}/ellipsoid",
-                (rr.Ellipsoids3D.from_fields(colors=style.FUSED, line_radii=style.points(0.5)),),
+                (rr.Ellipsoids3D.from_fields(line_radii=style.points(0.5)),),
             ),
             Always(
                 entity("fuse", "state", track),
@@ -126,8 +125,8 @@ class TrackScene:
                 entity("fuse", flown.track),
                 flown.time,
                 flown.step,
-                rr.Points3D.columns(positions=flown.runway_m),
-                rr.GeoPoints.columns(positions=flown.lat_lon_deg),
+                rr.Points3D.columns(positions=flown.runway_m, colors=_colours(flown)),
+                rr.GeoPoints.columns(positions=flown.lat_lon_deg, colors=_colours(flown)),
                 rr.Scalars.columns(scalars=np.stack([speed, sink], axis=-1)),
             )
         ]
@@ -144,9 +143,10 @@ class TrackScene:
         placed = rr.Transform3D.columns(
             translation=flown.runway_m, quaternion=quaternion, scale=np.repeat(length[:, None], 3, axis=1)
         )
-        shape = rr.Ellipsoids3D.columns(centers=flown.runway_m, half_sizes=half, quaternions=axes)
+        colours = _colours(flown)
+        shape = rr.Ellipsoids3D.columns(centers=flown.runway_m, half_sizes=half, quaternions=axes, colors=colours)
         return [
-            rows(f"{path}/symbol", flown.time, flown.step, placed),
+            rows(f"{path}/symbol", flown.time, flown.step, placed, rr.Mesh3D.columns(albedo_factor=colours)),
             rows(f"{path}/ellipsoid", flown.time, flown.step, shape),
         ]
 
@@ -154,9 +154,10 @@ class TrackScene:
         """Who it is, how high, how fast: the data block of a controller's screen."""
         chosen, texts = [], []
         for row, now in enumerate(flown.time.tolist()):
-            if now - drawn.labelled < LABEL_NS and flown.state[row] == drawn.labelled_state:
+            told = self._seen(flown, row)
+            if now - drawn.labelled < LABEL_NS and told == drawn.labelled_state:
                 continue
-            drawn.labelled, drawn.labelled_state = now, flown.state[row]
+            drawn.labelled, drawn.labelled_state = now, told
             chosen.append(row)
             texts.append(self._block(flown, row))
         if not chosen:
@@ -183,7 +184,7 @@ class TrackScene:
         if np.isfinite(up):
             digits = 1 if units is style.SI else 0
             parts.append(f"{'↑' if up >= 0.0 else '↓'}{abs(up) * units.climbs:.{digits}f} {units.climb}")
-        return f"{who} {flown.state[row]}\n{' '.join(parts)}"
+        return f"{who} {self._seen(flown, row)}\n{' '.join(parts)}"
 
     def _plots(self, flown: Flown, drawn: _Drawn) -> list[Entry]:
         """Sigmas, mode probabilities and the error of the position source, where the estimator has them."""
@@ -226,3 +227,19 @@ class TrackScene:
             return []
         changes = rr.StateChange.columns(state=[flown.state[row] for row in chosen])
         return [rows(entity("fuse", "state", flown.track), flown.time[chosen], flown.step[chosen], changes)]
+
+    def _seen(self, flown: Flown, row: int) -> str:
+        """Which sources see it; whether it is to be believed yet; how far off it may be by now, where none does."""
+        state = flown.state[row]
+        if flown.life[row] == "tentative":
+            return f"{state}, tentative"
+        if state != "coasting":
+            return state
+        level = flown.covariance[row].reshape(6, 6).diagonal()[:2]
+        off = ELLIPSOID_SIGMAS * float(np.sqrt(0.5 * level.sum())) * self._units.lengths
+        return f"{state} ± {off:.0f} {self._units.length}"
+
+
+def _colours(flown: Flown) -> list[style.Colour]:
+    """A tentative track is dim, one that coasts is pale."""
+    return [style.LIVES[life] for life in flown.life]

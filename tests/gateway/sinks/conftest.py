@@ -94,6 +94,7 @@ class _Maker:
             bias_m=np.tile([35.0, 40.0, 28.0], (n, 1)) * (1.0 - np.exp(-time_s / 60.0))[:, None],
             pressure_altitude_m=np.full(n, np.nan),
             callsign=none,
+            life=("coasting" if state == "coasting" else "confirmed",) * n,
         )
 
     def predicted(self, time_s: float, track: int) -> Predicted:

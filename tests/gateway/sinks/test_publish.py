@@ -40,6 +40,7 @@ def row(track: int, at_s: float, **known: Any) -> dict[str, Any]:
         "velocity_mps": (60.0, -80.0, 2.0),
         "pressure_altitude_m": math.nan,
         "callsign": None,
+        "life": "confirmed",
         **known,
     }
 
@@ -53,7 +54,7 @@ def fused(rows: Sequence[dict[str, Any]], ended: Sequence[int] = ()) -> Fused:
         made[name] = np.array(made.get(name, ()), dtype=kind)
     for name in ("latitude_rad", "longitude_rad", "height_m", "altitude_msl_m", "pressure_altitude_m"):
         made[name] = np.array(made.get(name, ()), dtype=np.float64)
-    for name in ("aircraft", "radar_track", "updated_by", "state", "callsign"):
+    for name in ("aircraft", "radar_track", "updated_by", "state", "callsign", "life"):
         made.setdefault(name, ())
     made["velocity_mps"] = np.array(made.get("velocity_mps", ()), dtype=np.float64).reshape(n, 3)
     nothing = {
