@@ -22,9 +22,12 @@ from collections.abc import Mapping, Sequence
 from itertools import count
 from typing import Protocol
 
+import numpy as np
+
 from adapters import Arrival, Source, told
 from adapters.epoch import SessionEpoch
-from adapters.frame_batches import MANY, NO_HEAD, Head, frame_of, take, wanted
+from adapters.frame_batches import MANY, NO_HEAD, Head, frame_of, heads_of, payload_of, places_of, wanted
+from adapters.gathering import PASSING, Gathered, Said
 from adapters.listening import Listened
 from adapters.mavlink import MavlinkObserver
 from adapters.mavlink_frames import Frame, parse
@@ -40,8 +43,6 @@ from gateway.observation import FlightPlan, Heard, Observation, PlanPoint
 from gateway.picture import Health
 
 Observations = tuple[Observation, ...]
-Said = list[tuple[int, Heard]]
-"""What some of many arrivals said, each with its place among them."""
 
 
 class FrameGuard(Protocol):
@@ -72,7 +73,7 @@ class Decoder:
         self._epoch = SessionEpoch()
         self._mavlink = MavlinkObserver(self._epoch)
         self._wanted = self._mavlink.wanted
-        self._which = wanted(self._wanted)
+        self._which, self._passing = wanted(self._wanted), wanted(PASSING)
         self._signing = signing
         self._radar = LandingRadarReceiver(dict(keys or {}), live)
         self._listened: dict[int, Listened] = {}
@@ -103,10 +104,14 @@ class Decoder:
         """The session's time of a stamp, ns since 1970 UTC."""
         return self._epoch.session_time(received_at)
 
-    def hear_many(self, arrivals: Sequence[Arrival]) -> tuple[Said, list[int]]:
-        """The same as to hear each of them, in less time: what those said that said anything, and which were refused."""
+    def hear_many(self, arrivals: Sequence[Arrival], heads: Sequence[Head] | None = None) -> tuple[Said, list[int]]:
+        """The same as to hear each of them, in less time: what those said that said anything, and which were refused.
+
+        Of many, what no stage reads (attitudes, inertial samples, air data) comes together, as one Heard for all that was said
+        until something else was, or the second was over. `heads`: of each arrival, where `heads_of` was asked already.
+        """
         if len(arrivals) >= MANY and self._signing is None:
-            return self._hear_together(arrivals)
+            return self._hear_together(arrivals, heads)
         said, refused = [], []
         for place, arrival in enumerate(arrivals):
             heard = self.hear(arrival)
@@ -116,41 +121,55 @@ class Decoder:
                 refused.append(place)
         return said, refused
 
-    def _hear_together(self, arrivals: Sequence[Arrival]) -> tuple[Said, list[int]]:
-        heads, payloads = take([data for _, _, data, _ in arrivals], self._which)
+    def _hear_together(self, arrivals: Sequence[Arrival], known: Sequence[Head] | None) -> tuple[Said, list[int]]:
+        heads = heads_of([data for _, _, data, _ in arrivals]) if known is None else np.array(known, np.int64)
         numbers = [number for _, number, _, _ in arrivals]
-        counted = count_unbroken(arrivals, numbers, heads, self._listened)
-        said, refused = [], []
-        for place, head, payload, component in zip(count(), heads, payloads, counted, strict=False):
-            if component is None:
-                heard = self.hear(arrivals[place], head, payload)
+        components, senders = count_unbroken(arrivals, numbers, heads, self._listened)
+        left = np.flatnonzero(places_of(heads, self._which) | (senders < 0))
+        passing = places_of(heads[left], self._passing) & (senders[left] >= 0)
+        gathered, refused = Gathered(self._epoch, self._listened), list[int]()
+        for place, head, sender, passes in zip(
+            left.tolist(), heads[left].tolist(), senders[left].tolist(), passing.tolist(), strict=True
+        ):
+            arrival = arrivals[place]
+            if passes and self._unclaimed is None and self._epoch.offset_s is not None:
+                self._gather(gathered, place, arrival, components[sender], head >> 24)
+                continue
+            gathered.close()
+            if sender >= 0:
+                heard = self._hear_counted(arrival, components[sender], head >> 24)
+            else:
+                heard = self.hear(arrival, head)
                 if self.refused is not None:
                     refused.append(place)
-            elif payload is not None:
-                heard = self._hear_counted(arrivals[place], component, head >> 24, payload)
-            else:
-                continue
             if heard is not None:
-                said.append((place, heard))
+                gathered.said.append((place, heard))
+        gathered.close()
         for number, place in dict(zip(numbers, count(), strict=False)).items():
             self._listened[number].last_heard = arrivals[place].received_at
-        return said, refused
+        return gathered.said, refused
 
-    def _hear_counted(self, arrival: Arrival, component: Component, message: int, payload: bytes) -> Heard | None:
+    def _gather(self, gathered: Gathered, place: int, arrival: Arrival, component: Component, message: int) -> None:
+        received_at, number, data, _ = arrival
+        payload, counters = payload_of(data, message), self._listened[number].counters
+        gathered.add(place, number, received_at, self._mavlink.read(component, message, payload, received_at, counters))
+        if self._notes:
+            gathered.close(self._say())
+
+    def _hear_counted(self, arrival: Arrival, component: Component, message: int) -> Heard | None:
         """What a good frame says that was counted with those around it."""
-        received_at, number, _, _ = arrival
+        received_at, number, data, _ = arrival
         listened = self._listened[number]
         was_settled = self._epoch.offset_s is not None
-        found = self._mavlink.read(component, message, payload, received_at, listened.counters)
+        found = self._mavlink.read(component, message, payload_of(data, message), received_at, listened.counters)
         if self._plans or self._unclaimed:
             found = self._with_plans(found, received_at)
         return self._as_heard(found, listened, received_at, was_settled)
 
-    def hear(self, arrival: Arrival, head: Head = NO_HEAD, payload: bytes | None = None) -> Heard | None:
+    def hear(self, arrival: Arrival, head: Head = NO_HEAD) -> Heard | None:
         """One MAVLink frame, radar datagram or told line; None where it observed nothing and there is nothing to say.
 
-        `head`, `payload`: what `take` has found, if anything. Raises KeyError for a source that was not added, and nothing
-        else.
+        `head`: as `heads_of` has it, where it was asked. Raises KeyError for a source that was not added, and nothing else.
         """
         received_at, number, data, _ = arrival
         listened = self._listened[number]
@@ -160,9 +179,10 @@ class Decoder:
         if kind == "mavlink":
             if self._signing is not None and not self._believes(arrival, listened):
                 return self._only_notes(received_at)
-            if payload is None and listened.passes(data, head, self._wanted, received_at):
+            is_wanted = head != NO_HEAD and head >> 24 in self._wanted
+            if not is_wanted and listened.passes(data, head, self._wanted, received_at):
                 return self._only_notes(received_at) if self._notes else None
-            frame = parse(data) if payload is None else frame_of(head, payload)
+            frame = frame_of(head, payload_of(data, head >> 24)) if is_wanted else parse(data)
             found = self._hear_mavlink(arrival, frame, listened)
         else:
             found = self._hear_radar(arrival, listened) if kind == "radar" else self._hear_told(arrival, listened)

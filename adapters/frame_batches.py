@@ -18,37 +18,33 @@ from fastcrc.crc16 import mcrf4xx
 from numpy.typing import NDArray
 
 from adapters.framing import EXTRAS, ONE_BYTE, TWO_BYTES
-from adapters.mavlink_frames import V2, WHOLE_SIZES, ZEROS, Frame, new_frame
+from adapters.mavlink_frames import V2, Frame, new_frame, padded
 
 Head = int
 """A good frame's message id << 24 | component << 16 | system << 8 | sequence, as its header has them; NO_HEAD for none."""
 
 NO_HEAD: Head = -1
 _SIX_BYTES = (1 << 48) - 1
-_WHOLE = np.zeros(len(EXTRAS), np.int64)
-_WHOLE[list(WHOLE_SIZES)] = list(WHOLE_SIZES.values())
 MANY = 100  # from so many datagrams on it pays to take them together
 _BEFORE_TWO = np.empty(65_536, np.uint16)
 _BEFORE_TWO[TWO_BYTES] = np.arange(65_536)
 _INITIAL = next(state for state in range(65_536) if int(ONE_BYTE[(state ^ V2) & 255]) ^ state >> 8 == 0xFFFF)
 
 
+Heads = NDArray[np.int64]
 Wanted = NDArray[np.bool_]
 """Which message ids are wanted, by id; see `wanted`."""
 
 
 def wanted(messages: Collection[int]) -> Wanted:
-    """These message ids as `take` asks for them."""
+    """These message ids as `places_of` asks for them."""
     table = np.zeros(len(EXTRAS), np.bool_)
     table[list(messages)] = True
     return table
 
 
-def take(datagrams: Sequence[bytes], which: Wanted) -> tuple[list[Head], list[bytes | None]]:
-    """The head of each datagram, and its whole payload if it is a wanted message, else None.
-
-    NO_HEAD unless it is one whole good unsigned MAVLink 2 frame of a known message.
-    """
+def heads_of(datagrams: Sequence[bytes]) -> Heads:
+    """The head of each datagram: NO_HEAD unless it is one whole good unsigned MAVLink 2 frame of a known message."""
     count = len(datagrams)
     sizes = np.fromiter(map(len, datagrams), np.int64, count)
     block = np.frombuffer(b"".join((*datagrams, bytes(16))), np.uint8)  # a header behind the last one, were it empty
@@ -57,19 +53,21 @@ def take(datagrams: Sequence[bytes], which: Wanted) -> tuple[list[Head], list[by
     first = np.ndarray(len(block) - 3, "<u4", block, strides=(1,))[start]  # magic, length, two flags
     head = np.ndarray(len(block) - 11, "<i8", block, strides=(1,))[start + 4] & _SIX_BYTES
     told = np.ndarray(len(block) - 1, "<u2", block, strides=(1,))[end - 2]
-    length, message = (first >> 8 & 255).astype(np.int64), np.minimum(head >> 24, len(EXTRAS) - 1)
-    plain = (first & 0xFF00FF == V2) & (sizes == length + 12)
+    plain = (first & 0xFF00FF == V2) & (sizes == (first >> 8 & 255).astype(np.int64) + 12)
     state = np.array(list(map(mcrf4xx, datagrams, repeat(_INITIAL))), np.uint16)
-    crc, extra = _BEFORE_TWO[state] ^ told, EXTRAS[message]
+    crc, extra = _BEFORE_TWO[state] ^ told, EXTRAS[np.minimum(head >> 24, len(EXTRAS) - 1)]
     is_good = plain & (extra >= 0) & (ONE_BYTE[(crc ^ extra) & 255] ^ crc >> 8 == told)
-    places = np.flatnonzero(is_good & which[message])
-    cut = np.maximum(_WHOLE[message[places]] - length[places], 0)
-    payloads: list[bytes | None] = [None] * count
-    zeros = ZEROS
-    for place, missing in zip(places.tolist(), cut.tolist(), strict=True):
-        payloads[place] = datagrams[place][10:-2] + zeros[missing]
-    found: list[Head] = np.where(is_good, head, NO_HEAD).tolist()
-    return found, payloads
+    return np.where(is_good, head, NO_HEAD)
+
+
+def places_of(heads: Heads, which: Wanted) -> NDArray[np.bool_]:
+    """Which of the heads are of a wanted message."""
+    return (heads != NO_HEAD) & which[np.maximum(heads, 0) >> 24]
+
+
+def payload_of(datagram: bytes, message: int) -> bytes:
+    """The whole payload of a datagram that has a head."""
+    return padded(datagram[10:-2], message)
 
 
 def frame_of(head: Head, payload: bytes) -> Frame:

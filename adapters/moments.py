@@ -68,14 +68,14 @@ class Moments:
         clock = component.clock
         if not clock.has_been_heard():
             return self.epoch.session_time(received_at), Timing.PROVISIONAL
-        return self.when(component, clock.boot_at(received_at), received_at)
+        return self.epoch.when(clock, clock.boot_at(received_at), received_at)
 
     def near(self, component: Component, usec: int, received_at: int) -> When:
         """When a time_usec was that is not to set the source's clock; the time of receipt where it is of another clock."""
         boot_ns = self.since_boot(component, usec, received_at)
-        return (
-            self.at_receipt(component, received_at) if boot_ns is None else self.when(component, boot_ns, received_at)
-        )
+        if boot_ns is None:
+            return self.at_receipt(component, received_at)
+        return self.epoch.when(component.clock, boot_ns, received_at)
 
     def since_boot(self, component: Component, usec: int, received_at: int) -> int | None:
         """A time_usec as time since boot, ns; None where it is UTC, or further than 10 s from the component's newest."""

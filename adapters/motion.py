@@ -102,10 +102,7 @@ def _attitude(
     if boot_ns == vehicle.last_attitude:
         counters["attitude told twice"] += 1
         return ()
-    vehicle.last_attitude = boot_ns
-    for name, angle in zip(("roll, degrees", "pitch, degrees"), angles, strict=False):
-        vehicle.readings[name] = math.degrees(angle)
-    vehicle.readings["heading, degrees"] = math.degrees(angles[2]) % 360.0
+    vehicle.last_attitude, vehicle.attitude_rad = boot_ns, angles
     valid_at, _ = moments.when(component, boot_ns, received_at)
     return (Attitude(vehicle.name, valid_at, received_at, *angles),)
 
@@ -217,11 +214,25 @@ def _scaled(
 
 def _sample(vehicle: Vehicle, sensor: int, vectors: list[Vector | None], when: When, received_at: int) -> ImuSample:
     acceleration, rate, magnetic = vectors
-    readings, names = vehicle.readings, _NAMES[min(sensor, len(_NAMES)) - 1]
+    latest = vehicle.inertial.get(sensor)
+    if latest is None:
+        latest = vehicle.inertial[sensor] = [None, None, None]
     if acceleration is not None:
-        readings[names[0]] = math.hypot(*acceleration)
+        latest[0] = acceleration
     if rate is not None:
-        readings[names[1]] = math.hypot(*rate)
+        latest[1] = rate
     if magnetic is not None:
-        readings[names[2]] = math.hypot(*magnetic)
+        latest[2] = magnetic
     return ImuSample(vehicle.name, when[0], received_at, sensor, acceleration, rate, magnetic)
+
+
+def readings(vehicle: Vehicle) -> dict[str, float]:
+    """What people are shown of how a vehicle lies and is accelerated; made when it is asked for, not with each frame."""
+    shown = {}
+    if vehicle.attitude_rad is not None:
+        roll, pitch, yaw = map(math.degrees, vehicle.attitude_rad)
+        shown = {"roll, degrees": roll, "pitch, degrees": pitch, "heading, degrees": yaw % 360.0}
+    for sensor, latest in vehicle.inertial.items():
+        names = _NAMES[min(sensor, len(_NAMES)) - 1]
+        shown |= {name: math.hypot(*vector) for name, vector in zip(names, latest, strict=True) if vector is not None}
+    return shown

@@ -11,9 +11,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adapters import Arrival
-from adapters.frame_batches import NO_HEAD, Head
+from adapters.frame_batches import NO_HEAD, Heads
 from adapters.listening import Listened
 from adapters.vehicles import Component
 
@@ -24,8 +25,8 @@ class _Sent(NamedTuple):
     source: int
     system: int
     component: Component | None
-    places: list[int]
-    messages: list[int]
+    places: NDArray[np.intp]
+    messages: Heads
     first: int
     runs_on: bool
 
@@ -36,56 +37,57 @@ class _Sent(NamedTuple):
             component is not None
             and self.runs_on
             and component.sequence.goes_on(self.first)
-            and arrivals[self.places[-1]].received_at < component.rates.until
+            and arrivals[int(self.places[-1])].received_at < component.rates.until
         )
 
 
 def count_unbroken(
-    arrivals: Sequence[Arrival], numbers: Sequence[int], heads: Sequence[Head], listened: Mapping[int, Listened]
-) -> list[Component | None]:
-    """Count the frames of all systems whose numbers run on; the component of each frame that was counted, else None.
+    arrivals: Sequence[Arrival], numbers: Sequence[int], heads: Heads, listened: Mapping[int, Listened]
+) -> tuple[list[Component], NDArray[np.int64]]:
+    """Count the frames of all systems whose numbers run on: their components, and which of these sent each frame, else -1.
 
     `numbers`, `heads`: the source and the head of each arrival, in the order of their stamps. Left alone are whole sources
     of which anything has no head, and whole systems with a gap, a new component, components that share a counter, or rates
     that are due.
     """
     sent = list(_by_component(numbers, heads, listened))
-    broken = {number for number, head in zip(numbers, heads, strict=True) if head == NO_HEAD}
+    broken = {numbers[place] for place in np.flatnonzero(heads == NO_HEAD).tolist()}
     uneven = {(one.source, one.system) for one in sent if not one.is_unbroken(arrivals)}
-    counted: list[Component | None] = [None] * len(arrivals)
+    components: list[Component] = []
+    senders = np.full(len(arrivals), -1)
     newest: dict[tuple[int, int], tuple[int, Component]] = {}
     for one in sent:
         component, key = one.component, (one.source, one.system)
         if component is None or one.source in broken or key in uneven:
             continue
-        component.sequence.run_on(one.first, one.messages)
-        component.rates.hear_all(one.messages)
+        messages = one.messages.tolist()
+        component.sequence.run_on(one.first, messages)
+        component.rates.hear_all(messages)
         heard = listened[one.source]
-        heard.counters["frames"] += len(one.messages)
-        heard.known_good.update(one.messages)
-        for place in one.places:
-            counted[place] = component
-        if key not in newest or newest[key][0] < one.places[-1]:
-            newest[key] = one.places[-1], component
+        heard.counters["frames"] += len(messages)
+        heard.known_good.update(messages)
+        senders[one.places] = len(components)
+        components.append(component)
+        last = int(one.places[-1])
+        if key not in newest or newest[key][0] < last:
+            newest[key] = last, component
     for _, component in newest.values():
         component.sequence.be_newest()
-    return counted
+    return components, senders
 
 
-def _by_component(numbers: Sequence[int], heads: Sequence[Head], listened: Mapping[int, Listened]) -> Iterator[_Sent]:
-    head = np.array(heads, np.int64)
+def _by_component(numbers: Sequence[int], head: Heads, listened: Mapping[int, Listened]) -> Iterator[_Sent]:
     senders = np.array(numbers, np.int64) << 16 | head >> 8 & 0xFFFF
     order = np.argsort(senders, kind="stable")
     senders, head = senders[order], head[order]
-    sequence = head & 255
+    sequence, messages = head & 255, head >> 24
     is_first = np.diff(senders, prepend=-1) != 0
     begins = np.flatnonzero(is_first)
     runs_on = np.logical_and.reduceat(is_first | (np.diff(sequence, prepend=0) & 255 == 1), begins).tolist()
-    places, messages = order.tolist(), (head >> 24).tolist()
-    bounds = pairwise((*begins.tolist(), len(places)))
+    bounds = pairwise((*begins.tolist(), len(order)))
     for sender, (begin, end), first, runs in zip(
         senders[begins].tolist(), bounds, sequence[begins].tolist(), runs_on, strict=True
     ):
         number = sender >> 16
         component = listened[number].components.get(sender & 0xFFFF)
-        yield _Sent(number, sender & 255, component, places[begin:end], messages[begin:end], first, runs)
+        yield _Sent(number, sender & 255, component, order[begin:end], messages[begin:end], first, runs)

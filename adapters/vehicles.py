@@ -54,6 +54,8 @@ class Vehicle:
     had_fix: bool = False
     status: VehicleStatus | None = None  # what its last heartbeat said
     last_attitude: int = -1  # time since boot, ns
+    attitude_rad: tuple[float, float, float] | None = None  # what it last said, for people
+    inertial: dict[int, list[tuple[float, float, float] | None]] = field(default_factory=dict)  # likewise, by sensor
     readings: dict[str, float] = field(default_factory=dict)  # what it last said, for people: "airspeed, m/s": 21.3
     words: dict[str, str] = field(default_factory=dict)  # and in words: "landed": "on ground"
     told: dict[tuple[int, int, bytes], int] = field(default_factory=dict)  # (component, message, time): its source
@@ -82,6 +84,7 @@ class Component:
     reboots_told: int = 0
     has_date_note: bool = False
     linked_to: Vehicle | None = None  # whose other links' clocks this one knows
+    member: _Member | None = None
 
     def take_role(self, kind: int, autopilot: int) -> None:
         """What a HEARTBEAT says that this component is; it may change."""
@@ -144,12 +147,9 @@ class Registry:
         self, component: Component, message: int, payload: bytes, received_at: int, counters: Counter[str]
     ) -> Vehicle | None:
         """The vehicle that a message of a vehicle's component tells of; None where that is undecided, or was heard already."""
-        source, system, _ = component.key
-        members = self._members.setdefault(system, {})
-        member = members.get(source)
+        member = component.member
         if member is None:
-            member = members[source] = _Member(source, system)
-            self._follow(members, received_at)
+            member = component.member = self._member(*component.key[:2], received_at)
         if member.trace is not None:
             self._compare(member, message, payload, received_at, counters)
         vehicle = member.vehicle
@@ -160,8 +160,8 @@ class Registry:
                 return None
             joins = bool(vehicle.sources) and received_at - vehicle.last_heard < _ALIVE_NS
             member.vehicle = vehicle
-            vehicle.sources.add(source)
-            self._follow(members, received_at)
+            vehicle.sources.add(member.source)
+            self._follow(self._members[member.system], received_at)
             if joins:
                 counters["undecided"] += 1
                 return None  # what told them to be one was heard on the other link
@@ -170,6 +170,14 @@ class Registry:
             counters["heard twice"] += 1
             return None
         return vehicle
+
+    def _member(self, source: int, system: int, received_at: int) -> _Member:
+        members = self._members.setdefault(system, {})
+        member = members.get(source)
+        if member is None:
+            member = members[source] = _Member(source, system)
+            self._follow(members, received_at)
+        return member
 
     def _follow(self, members: dict[int, _Member], received_at: int) -> None:
         """Follow the motion of those that are, or may be, one vehicle over several sources, and of no others."""

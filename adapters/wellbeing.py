@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from adapters import motion
 from adapters.epoch import SessionEpoch
 from adapters.mavlink_frames import message_name
 from adapters.vehicles import Component, Registry, Vehicle
@@ -70,7 +71,7 @@ def _vehicle(
         (told if timing in (Timing.UTC, Timing.FOREIGN) else clock).sigma_s() if settled else math.nan,
         delay_s,
         delay_99_s,
-        (*vehicle.readings.items(), *_rates(own, received_at)),
+        (*motion.readings(vehicle).items(), *vehicle.readings.items(), *_rates(own, received_at)),
         tuple(words.items()),
     )
 

@@ -156,16 +156,17 @@ def _readers(wanted: dict[str, tuple[str, ...]] | None) -> dict[int, Callable[[b
 
 
 def _in_turns(frames: Sequence[bytes], chosen: dict[str, tuple[str, ...]] | None) -> int:
-    from adapters.frame_batches import NO_HEAD, take, wanted
+    from adapters.frame_batches import NO_HEAD, heads_of, payload_of, places_of, wanted
 
     readers, count = _readers(chosen), 0
     which = wanted(readers)
     for at in range(0, len(frames), TURN):
-        heads, payloads = take(frames[at : at + TURN], which)
-        count += len(heads) - heads.count(NO_HEAD)
-        for head, payload in zip(heads, payloads, strict=True):
-            if payload is not None:
-                readers[head >> 24](payload)
+        turn = frames[at : at + TURN]
+        heads = heads_of(turn)
+        count += int((heads != NO_HEAD).sum())
+        places = places_of(heads, which).nonzero()[0]
+        for place, message in zip(places.tolist(), (heads[places] >> 24).tolist(), strict=True):
+            readers[message](payload_of(turn[place], message))
     return count
 
 

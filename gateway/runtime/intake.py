@@ -11,9 +11,10 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from itertools import accumulate, islice, repeat
 from operator import itemgetter
+from typing import NamedTuple
 
 from adapters import Arrival, Source
-from adapters.frame_batches import MANY, NO_HEAD, take, wanted
+from adapters.frame_batches import MANY, NO_HEAD, Head, heads_of
 from adapters.mavlink_frames import FrameScanner
 from gateway.runtime.allowed import Allowed
 from gateway.runtime.links import Chunks
@@ -21,7 +22,6 @@ from gateway.runtime.stamps import Stamper
 from gateway.runtime.told_plans import TOLD
 
 PEERS_AT_MOST = 128  # a session's MAVLink peers; more are counted and not heard
-_NONE_WANTED = wanted(())  # here frames are only cut
 _STRANGERS_AT_MOST = 64  # peers that have not sent a whole frame yet; the one silent for longest makes room
 
 
@@ -42,6 +42,14 @@ class _Peer:
         if stream != self.stream:
             self.stream, self.scanner = stream, FrameScanner(self.scanner.counters)
         return self.scanner.feed(data)
+
+
+class Taken(NamedTuple):
+    """The sources that are new, and arrivals in the order of their stamps; `heads` of each, where they are known of all."""
+
+    sources: list[Source]
+    arrivals: list[Arrival]
+    heads: list[Head] | None = None
 
 
 class Intake:
@@ -78,11 +86,11 @@ class Intake:
         """The link and the peer of a MAVLink source; None for a radar, which is sent nothing, or an unknown number."""
         return self._reached.get(source)
 
-    def take(self, heard: Sequence[tuple[int, Chunks]]) -> tuple[list[Source], list[Arrival]]:
-        """Sources that are new, and the arrivals of one turn of all links (link number, chunks), in order of stamps."""
+    def take(self, heard: Sequence[tuple[int, Chunks]]) -> Taken:
+        """What one turn of all links (link number, chunks) brought."""
         sources, self._unannounced = self._unannounced, []
         if len(heard) == 1 and (plain := self._take_plain(*heard[0])) is not None:
-            return sources, plain
+            return Taken(sources, *plain)
         instants: list[int] = []
         numbers: list[int] = []
         contents: list[bytes] = []
@@ -115,19 +123,19 @@ class Intake:
                 contents.append(frame)
                 names.append("")
         stamps = self._stamper.stamps(instants)
-        return sources, list(map(_ARRIVAL, zip(stamps, numbers, contents, names, strict=True)))
+        return Taken(sources, list(map(_ARRIVAL, zip(stamps, numbers, contents, names, strict=True))))
 
-    def _take_plain(self, link: int, chunks: Chunks) -> list[Arrival] | None:
+    def _take_plain(self, link: int, chunks: Chunks) -> tuple[list[Arrival], list[Head]] | None:
         """The arrivals of many datagrams that are one good frame each, of peers that are sources: almost all there are
-        where thousands a second come. None where anything else is among them.
+        where thousands a second come; and their heads. None where anything else is among them.
         """
         if len(chunks.data) < MANY or chunks.stream is not None or self._allowed.systems is not None:
             return None
         numbers = list(map(self._numbers[link].get, chunks.peers))
-        if None in numbers or NO_HEAD in take(chunks.data, _NONE_WANTED)[0]:
+        if None in numbers or NO_HEAD in (heads := heads_of(chunks.data).tolist()):
             return None
         stamps = self._stamper.stamps(list(accumulate(self._stamper.heard(chunks.kernel_utc_ns), max)))
-        return list(map(_ARRIVAL, zip(stamps, numbers, chunks.data, repeat(""), strict=False)))  # type: ignore[arg-type]
+        return list(map(_ARRIVAL, zip(stamps, numbers, chunks.data, repeat(""), strict=False))), heads  # type: ignore[arg-type]
 
     def tell(self, lines: Sequence[bytes]) -> tuple[list[Source], list[Arrival]]:
         """What people told the gateway: its source, if it is the first time, and the lines as arrivals of now."""

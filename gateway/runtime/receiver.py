@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from adapters import Arrival, Source
+from adapters.frame_batches import Head
 from gateway.runtime.allowed import Allowed
 from gateway.runtime.intake import Intake
 from gateway.runtime.links import Link
@@ -30,11 +31,15 @@ QUEUE_ARRIVALS = 200_000  # some 60 MB, and 20 s of the fastest stream measured
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """What came since the last hand-over. `notes` are (level, text), to be told to a person once."""
+    """What came since the last hand-over. `notes` are (level, text), to be told to a person once.
+
+    `heads`: of each arrival, as `heads_of` has them, where the cutting of the frames has found them for all.
+    """
 
     watermark: int
     sources: tuple[Source, ...] = ()
     arrivals: list[Arrival] = field(default_factory=list)
+    heads: list[Head] | None = None
     notes: tuple[tuple[str, str], ...] = ()
 
 
@@ -66,6 +71,7 @@ class Receiver:
         self._told: deque[bytes] = deque()
         self._new_sources: list[Source] = []
         self._arrivals: list[Arrival] = []
+        self._heads: list[Head] | None = []
         self._notes: list[tuple[str, str]] = []
         self.started_at = self._watermark = self._stamper.watermark()  # before the first arrival, ns since 1970 UTC
         self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
@@ -79,8 +85,9 @@ class Receiver:
         if self._failure is not None:
             raise self._failure
         with self._lock:
-            delivery = Delivery(self._watermark, tuple(self._new_sources), self._arrivals, tuple(self._notes))
-            self._new_sources, self._arrivals, self._notes = [], [], []
+            sources, notes = tuple(self._new_sources), tuple(self._notes)
+            delivery = Delivery(self._watermark, sources, self._arrivals, self._heads, notes)
+            self._new_sources, self._arrivals, self._heads, self._notes = [], [], [], []
         return delivery
 
     def close(self) -> None:
@@ -141,10 +148,10 @@ class Receiver:
         heard = [(number, chunks) for number, link in enumerate(self._links) if (chunks := link.receive()).data]
         count = sum(len(chunks.data) for _, chunks in heard)
         self._rest_s = self._rest(count)
-        sources, arrivals = self._intake.take(heard)
+        sources, arrivals, heads = self._intake.take(heard)
         if self._told:
             told_by, told = self._intake.tell([self._told.popleft() for _ in range(len(self._told))])
-            sources, arrivals = [*sources, *told_by], [*arrivals, *told]
+            sources, arrivals, heads = [*sources, *told_by], [*arrivals, *told], None
         notes = [note for link in self._links for note in link.news]
         for link in self._links:
             link.news.clear()
@@ -152,6 +159,10 @@ class Receiver:
             self._new_sources += sources
             room = self._capacity - len(self._arrivals)
             self._arrivals += arrivals[: max(room, 0)]
+            if arrivals and heads is None:
+                self._heads = None
+            elif heads is not None and self._heads is not None:
+                self._heads += heads[: max(room, 0)]
             if len(arrivals) > room:
                 self._overflow += len(arrivals) - max(room, 0)
                 if not self._overflow_told:

@@ -10,10 +10,12 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import itemgetter
 from pathlib import Path
 
 from adapters import Arrival, Source
 from adapters.decode import Decoder
+from adapters.frame_batches import Head
 from adapters.signing import SigningGuard
 from gateway import __version__
 from gateway.observation import Heard
@@ -29,6 +31,7 @@ from gateway.runtime.setup import Place, RunFailure, Setup
 from gateway.runtime.summary import Summary, Tally
 
 _FLUSH_NS = 500_000_000  # of wall time: half of the second that a kill may cost
+_SOURCE = itemgetter(1)  # of an Arrival
 
 
 class Run:
@@ -114,13 +117,17 @@ class Run:
                 raise self._failure(error) from error
 
     def work(
-        self, arrivals: Sequence[Arrival], watermark: int, notes: tuple[tuple[str, str], ...] = ()
+        self,
+        arrivals: Sequence[Arrival],
+        watermark: int,
+        notes: tuple[tuple[str, str], ...] = (),
+        heads: Sequence[Head] | None = None,
     ) -> Picture | None:
         """Take in arrivals and the watermark after them; the picture, or None while the place is not known.
 
-        `notes` are (level, text) of the links, to be told once.
+        `notes` are (level, text) of the links, to be told once. `heads`: of each arrival, where they are known.
         """
-        heard = self._hear(arrivals)
+        heard = self._hear(arrivals, heads)
         self._watermark = max(self._watermark, watermark)
         mark = self._decoder.watermark(self._watermark)
         heard.append(mark if not notes else replace(mark, notes=(*mark.notes, *notes)))
@@ -138,7 +145,7 @@ class Run:
             self._untold = ()
         return self._step(heard)
 
-    def _hear(self, arrivals: Sequence[Arrival]) -> list[Heard]:
+    def _hear(self, arrivals: Sequence[Arrival], heads: Sequence[Head] | None) -> list[Heard]:
         """Record and decode; what holds something for the picture."""
         if self._first_at is None and arrivals:
             self._first_at = arrivals[0].received_at
@@ -146,14 +153,14 @@ class Run:
             begins = (place for place, one in enumerate(arrivals) if one.received_at >= opening.begins_at)
             if (at := next(begins, None)) is not None:
                 return [*self._open(self._decode(arrivals[:at]), opening), *self._decode(arrivals[at:])]
-        return self._decode(arrivals)
+        return self._decode(arrivals, heads)
 
-    def _decode(self, arrivals: Sequence[Arrival]) -> list[Heard]:
-        for source, number in Counter(arrival[1] for arrival in arrivals).items():
+    def _decode(self, arrivals: Sequence[Arrival], heads: Sequence[Head] | None = None) -> list[Heard]:
+        for source, number in Counter(map(_SOURCE, arrivals)).items():
             self._arrivals[source] += number
         if self.outputs is not None and self.outputs.publishes_on:
-            arrivals = self._without_our_own(arrivals, self.outputs)
-        said, refused = self._decoder.hear_many(arrivals)
+            arrivals, heads = self._without_our_own(arrivals, self.outputs), None
+        said, refused = self._decoder.hear_many(arrivals, heads)
         if self._recorder is not None:
             for place in refused:
                 self._recorder.refuse(arrivals[place])

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import all as dialect
 from pymavlink.generator.mavcrc import x25crc
 
 from adapters.columns import read_columns
-from adapters.frame_batches import NO_HEAD, frame_of, take, wanted
+from adapters.frame_batches import NO_HEAD, frame_of, heads_of, payload_of, places_of, wanted
 from adapters.mavlink_frames import FrameScanner, fields, padded, parse
 from adapters.tlog import TlogReader
 
@@ -87,8 +87,8 @@ def test_readers_and_batches_read_what_pymavlink_reads(version: int, kind: str) 
     frames = _frames(version, kind)
     plain = version == 2 and kind != "signed"
     together = [
-        None if payload is None else frame_of(head, payload)
-        for head, payload in zip(*take(frames, wanted(MESSAGES)), strict=True)
+        None if head == NO_HEAD else frame_of(head, payload_of(frame, head >> 24))
+        for frame, head in zip(frames, heads_of(frames).tolist(), strict=True)
     ]
     for frame, message, taken_together in zip(frames, _reference(frames), together, strict=True):
         taken, numbers = parse(frame), _numbers(message)
@@ -128,10 +128,10 @@ def test_a_batch_takes_a_datagram_only_where_it_is_one_good_frame() -> None:
         good,
     ]
     mixed += [good[:2] + b"\2" + good[3:], good[:7] + b"\xff\xff\xff" + good[10:], _frames(1, "whole")[0]]
-    heads, payloads = take(mixed, wanted([good[7]]))
+    heads = heads_of(mixed)
     assert [head != NO_HEAD for head in heads] == [one == good for one in mixed]
-    assert [one is not None for one in payloads] == [one == good for one in mixed]
-    assert take(mixed, wanted(())) == (heads, [None] * len(mixed))
+    assert places_of(heads, wanted([good[7]])).tolist() == [one == good for one in mixed]
+    assert not places_of(heads, wanted(())).any()
 
 
 def _many(count: int) -> list[bytes]:

@@ -10,6 +10,7 @@ from adapters import Arrival, Source
 from adapters.decode import Decoder
 from adapters.mavlink_frames import encode
 from adapters.sequences import SequenceCheck, Siblings
+from gateway.observation import Attitude, Heard
 
 SECOND = 10**9
 T0 = 1_790_000_000 * SECOND
@@ -56,6 +57,27 @@ def _stream(seed: int, faults: dict[str, int]) -> list[Arrival]:
     return arrivals
 
 
+def _in_order(said: list[tuple[int, Heard]]) -> list[object]:
+    """What was said, one after the other; when it was heard, of what a stage reads and of what people are told."""
+    told: list[object] = []
+    for place, heard in said:
+        for one in heard.observations:
+            told.append(one if isinstance(one, Attitude) else (place, heard.now, one))
+        told += [(place, heard.now, note) for note in heard.notes]
+    return told
+
+
+def test_what_no_stage_reads_is_one_thing_heard_and_apart_from_what_one_reads() -> None:
+    arrivals = [one for one in _stream(3, {}) if one.source == 0]
+    decoder = Decoder(LINKS)
+    decoder.hear_many(arrivals[:200])
+    said, _ = decoder.hear_many(arrivals[200:])
+    kinds = [[type(one) is Attitude for one in heard.observations] for _, heard in said]
+    assert all(len(set(kind)) <= 1 for kind in kinds)
+    assert max(len(kind) for kind in kinds if kind and kind[0]) > 3
+    assert max(len(kind) for kind in kinds if kind and not kind[0]) == 1
+
+
 def _all_of(decoder: Decoder, now: int) -> str:
     """Everything that is known of the components, in words."""
     components = decoder._mavlink.registry.components
@@ -97,7 +119,9 @@ def test_many_at_once_are_heard_and_counted_as_one_by_one(seed: int, faults: dic
     for first in range(0, len(arrivals), many):
         batch = arrivals[first : first + many]
         one_by_one = [(place, heard) for place, one in enumerate(batch) if (heard := alone.hear(one)) is not None]
-        assert together.hear_many(batch) == (one_by_one, [])
+        said, refused = together.hear_many(batch)
+        assert _in_order(said) == _in_order(one_by_one)
+        assert refused == []
         now = batch[-1].received_at
         assert _all_of(together, now) == _all_of(alone, now)
 

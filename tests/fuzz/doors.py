@@ -113,7 +113,7 @@ class Live:
         self.now = now
         stream = 0 if link == STREAM else None
         chunks = Chunks([peer] * len(data), list(data), [None] * len(data), stream)
-        sources, arrivals = self.intake.take([(link, chunks)])
+        sources, arrivals, _ = self.intake.take([(link, chunks)])
         if lines:
             more, told = self.intake.tell(lines)
             sources, arrivals = sources + more, arrivals + told

@@ -29,7 +29,7 @@ def said(peer: str, *data: bytes, stream: int | None = None, kernel: tuple[int |
 
 def test_links_are_merged_by_the_kernels_times_of_arrival() -> None:
     takes = intake()
-    _, arrivals = takes.take(
+    _, arrivals, _ = takes.take(
         [
             (0, said("a", frame(0), frame(1), kernel=(NOW - 3_000_000, NOW - 1_000_000))),
             (1, said("r", b"plot", kernel=(NOW - 2_000_000,))),
@@ -40,14 +40,14 @@ def test_links_are_merged_by_the_kernels_times_of_arrival() -> None:
 
 def test_what_one_link_says_keeps_its_order_whatever_the_kernel_stamped() -> None:
     takes = intake()
-    _, arrivals = takes.take([(0, said("a", frame(0), frame(1), kernel=(NOW - 1_000, NOW - 9_000)))])
+    _, arrivals, _ = takes.take([(0, said("a", frame(0), frame(1), kernel=(NOW - 1_000, NOW - 9_000)))])
     assert [arrival.data for arrival in arrivals] == [frame(0), frame(1)]
 
 
 def test_sources_are_numbered_once_and_named_apart() -> None:
     takes = intake(2, 2)
-    first, _ = takes.take([(0, said("a", frame(0))), (1, said("a", frame(0)))])
-    again, _ = takes.take([(0, said("a", frame(1)))])
+    first, _, _ = takes.take([(0, said("a", frame(0))), (1, said("a", frame(0)))])
+    again, _, _ = takes.take([(0, said("a", frame(1)))])
     assert [(source.number, source.name) for source in first] == [
         (0, "radar-1"),
         (1, "radar-2"),
@@ -61,20 +61,20 @@ def test_a_connection_that_begins_anew_never_completes_a_frame_of_the_one_before
     takes = intake()
     whole = frame(5)
     takes.take([(0, said("a", frame(4) + whole[:9], stream=0))])
-    _, arrivals = takes.take([(0, said("a", whole[9:] + frame(6), stream=1))])
+    _, arrivals, _ = takes.take([(0, said("a", whole[9:] + frame(6), stream=1))])
     assert [arrival.data for arrival in arrivals] == [frame(6)]
 
 
 def test_more_peers_than_anyone_has_are_counted_and_not_heard() -> None:
     takes = intake()
-    sources, _ = takes.take([(0, said(f"peer {n}", frame(0))) for n in range(PEERS_AT_MOST + 3)])
+    sources, _, _ = takes.take([(0, said(f"peer {n}", frame(0))) for n in range(PEERS_AT_MOST + 3)])
     assert sum(source.kind == "mavlink" for source in sources) == PEERS_AT_MOST
     assert takes.counters["link 0"]["datagrams of too many peers"] == 3
 
 
 def test_peers_that_are_not_allowed_never_become_sources_and_are_counted_by_link() -> None:
     takes = intake(allowed=parse_allowed(["10.0.0.0/24"]))
-    sources, arrivals = takes.take(
+    sources, arrivals, _ = takes.take(
         [
             (0, said("10.0.1.9:5", frame(0), frame(1))),
             (0, said("10.0.0.9:5", frame(2))),
@@ -90,14 +90,14 @@ def test_peers_that_are_not_allowed_never_become_sources_and_are_counted_by_link
 
 def test_a_byte_stream_needs_no_leave_because_its_url_named_it() -> None:
     takes = intake(allowed=parse_allowed(["10.0.0.0/24"]))
-    _, arrivals = takes.take([(0, said("serial:/dev/ttyUSB0:57600", frame(0) + frame(1), stream=0))])
+    _, arrivals, _ = takes.take([(0, said("serial:/dev/ttyUSB0:57600", frame(0) + frame(1), stream=0))])
     assert [arrival.data for arrival in arrivals] == [frame(0), frame(1)]
 
 
 def test_systems_that_are_not_allowed_are_left_out_frame_by_frame_and_make_no_source() -> None:
     takes = intake(allowed=parse_allowed(systems=["1"]))
     other = encode("HEARTBEAT", HEARTBEAT, system=2)
-    sources, arrivals = takes.take([(0, said("a", other + frame(0) + other)), (0, said("b", other))])
+    sources, arrivals, _ = takes.take([(0, said("a", other + frame(0) + other)), (0, said("b", other))])
     assert [source.origin for source in sources if source.kind == "mavlink"] == ["link 0 from a"]
     assert [arrival.data for arrival in arrivals] == [frame(0)]
     assert takes.counters["link 0"]["system not allowed"] == 3
@@ -105,7 +105,7 @@ def test_systems_that_are_not_allowed_are_left_out_frame_by_frame_and_make_no_so
 
 def test_the_way_back_to_a_source_is_its_link_and_its_peer() -> None:
     takes = intake(2, 1)
-    sources, _ = takes.take([(0, said("a", frame(0))), (1, said("a", frame(1)))])
+    sources, _, _ = takes.take([(0, said("a", frame(0))), (1, said("a", frame(1)))])
     ways = {source.name: takes.way_to(source.number) for source in sources}
     assert ways == {"radar-1": None, "mavlink-1": (0, "a"), "mavlink-2": (1, "a")}
 
@@ -126,5 +126,6 @@ def test_many_datagrams_at_once_give_what_each_alone_gives() -> None:
             alone.take([(0, Chunks([peer], [one], [at], None))])
             for peer, one, at in zip(peers, data, times, strict=True)
         ]
-        assert together == ([], [arrival for _, arrivals in one_by_one for arrival in arrivals])
+        assert together[:2] == ([], [arrival for _, arrivals, _ in one_by_one for arrival in arrivals])
+        assert (together.heads is None) == bool(extra)
         assert at_once.counters == alone.counters
