@@ -9,6 +9,7 @@ from gateway.fuse.lanes import Ended, Lane, Lanes, contains, emptied, joined
 from gateway.fuse.life import LifeChange, end_silent, sentence, told
 from gateway.fuse.placing import Scene, lane_of, reroute, take_fix, take_plot
 from gateway.fuse.rows import Fused, Row, coast, knows_height, table, work
+from gateway.fuse.settled import Settled, remaining, settled
 
 __all__ = [
     "Ended",
@@ -18,6 +19,7 @@ __all__ = [
     "LifeChange",
     "Row",
     "Scene",
+    "Settled",
     "coast",
     "contains",
     "emptied",
@@ -25,8 +27,10 @@ __all__ = [
     "joined",
     "knows_height",
     "lane_of",
+    "remaining",
     "reroute",
     "sentence",
+    "settled",
     "table",
     "take_fix",
     "take_plot",

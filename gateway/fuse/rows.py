@@ -17,6 +17,7 @@ from gateway.fuse.agreement import CONFIRMED
 from gateway.fuse.filtering import NEVER, Event, Job, carried_on, directions, run
 from gateway.fuse.lanes import Ended, Lane, Lanes, radar_names
 from gateway.fuse.life import LifeChange
+from gateway.fuse.settled import Settled
 from gateway.fuse.weighting import Model
 
 Floats = NDArray[np.float64]
@@ -54,6 +55,7 @@ class Fused:
     life: tuple[str, ...]  # "tentative", "confirmed", "coasting"
     ended: tuple[Ended, ...] = ()
     lived: tuple[LifeChange, ...] = ()  # which began, were confirmed, or coast, and why
+    settled: tuple[Settled, ...] = ()  # states that nothing can change any more
 
 
 @dataclass(frozen=True, slots=True, eq=False)
