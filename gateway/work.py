@@ -9,7 +9,7 @@ from gateway import align, associate, fuse, predict, track
 from gateway.align import SECOND, Fix, Geoid, Plot
 from gateway.associate import Association, Change, Setting
 from gateway.frames import RadarFrame
-from gateway.fuse import Ended, Lanes, LifeChange, Scene
+from gateway.fuse import Ended, Lanes, LifeChange, Scene, Settled
 from gateway.fuse.filtering import Job
 from gateway.fuse.rows import Row
 from gateway.fuse.weighting import Model
@@ -46,6 +46,7 @@ class Work:
         self.rows: list[Row] = []
         self.ended: list[Ended] = []
         self.lived: list[LifeChange] = []
+        self.settled: list[Settled] = []
         self.forecasts: list[predict.Forecast] = []
         self.events: list[Event] = []
         self.jobs: dict[int, Job] = {}
@@ -87,7 +88,8 @@ class Work:
         if alive and at % int(self.options.prediction_period_s * SECOND) == 0:
             self.forecasts.append(predict.forecast(alive, at, self.options.horizons_s, self.model))
         before = at - self.history
-        self.lanes = lanes.pruned(before)
+        was, self.lanes = self.lanes, lanes.pruned(before)
+        self.settled += fuse.settled(was, self.lanes)
         self.tracks = self.tracks.pruned(before - int(PLOT_MARGIN_S * SECOND))
         gone = associate.missing(self.association, self.tracks)
         for key, aircraft in self.association.ledger.pairs.items():
@@ -106,7 +108,9 @@ class Work:
             back_s = (self.now - now) / SECOND
             text = f"the session's time went back by {back_s:.0f} s: every track starts again, under its number"
             self.events.append(Event(now, "warning", text))
-        self.lanes, ended = fuse.emptied(self.lanes, now)
+        was = self.lanes
+        self.lanes, ended = fuse.emptied(was, now)
+        self.settled += fuse.settled(was, self.lanes)
         self.ended += ended
         self.tracks, self.association = RadarTracks(), Association()
         # An arrival stamped at a whole second comes before what happens at that second.
@@ -344,6 +348,7 @@ class Work:
         )
         observations = tuple(observation for arrival in self.heard for observation in arrival.observations)
         own = SourceHealth("gateway", "pipeline", 0.0, 0.0, 0, tuple(sorted(self.counters.items())))
+        table = fuse.table(self.rows, self.ended, self.lived, self.frame, self.model)
         picture = Picture(
             step=self.before.steps,
             now=self.now or 0,
@@ -352,7 +357,7 @@ class Work:
             track=track.table(self.tracks, self.untracked),
             associate=associate.table(self.checks, self.association.ledger, self.changes),
             register=self.registration.table(self.radars),
-            fuse=fuse.table(self.rows, self.ended, self.lived, self.frame, self.model),
+            fuse=replace(table, settled=tuple(self.settled)),
             predict=predict.table(self.forecasts, self.frame),
             truth=tuple(observation for observation in observations if isinstance(observation, Truth)),
             health=replace(health, sources=(*health.sources, own)),

@@ -10,6 +10,7 @@ more, confirms sooner.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,7 +38,11 @@ def score_after(base: Event, measure: Measure, model: Model) -> float:
 
 
 def expected(state: Estimate, elapsed_s: float, measure: Measure, model: Model) -> tuple[Estimate, Innovation]:
-    """One state (1, 9) carried on to a measurement and corrected by it, and what the measurement told it."""
+    """One state (1, 9) carried on to a measurement and corrected by it, and what the measurement told it.
+
+    By the one motion, also where the model has modes.
+    """
+    model = replace(model, modes=None)
     state = predict(state, np.array([elapsed_s]), model.motion)
     if not isinstance(measure, Fix):
         polar, sigma = np.array([measure.polar]), np.array([measure.sigma])
