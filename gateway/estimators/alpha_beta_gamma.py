@@ -19,8 +19,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.estimators import source_error
-from gateway.estimators.axis_covariance import PLACES, Terms, Three, carried, reduced, settled, with_velocity
+from gateway.estimators import fading, source_error
+from gateway.estimators.axis_covariance import (
+    Terms,
+    Three,
+    carried,
+    matrices,
+    positions_and_velocities,
+    reduced,
+    settled,
+    with_velocity,
+)
 from gateway.estimators.axis_innovation import Innovation, bounded
 from gateway.estimators.steady_gains import LEAST_RATIO, gains_of, gamma_for, lost_memory, memory
 
@@ -29,7 +38,7 @@ Bools = NDArray[np.bool_]
 
 WINDOW = 10  # residuals that p is the mean of
 LEAST_GAMMA, GREATEST_GAMMA = 1e-6, 3.5
-LEAST_DENSITY, GREATEST_DENSITY = 1e-6, 1e6  # m2/s5
+GREATEST_DENSITY = 1e6  # m2/s5
 GREATEST_LESSON = 9.0  # squared residual, normalised: what an outlier teaches of the calm target is bounded
 SHORTEST_S = 1e-3  # that a fixed q is taken over
 SPED_S = 10.0  # how long a measured velocity makes steady gains, which know of none, too high
@@ -43,6 +52,7 @@ class Tuning:
     q: float | None = None  # of a calm target, fixed, for equal intervals; None = from the table
     density: float = 0.1  # m2/s5 at the start: growth of the acceleration's variance a second
     learning: float = 0.02  # of the logarithm of the density, for each unit of surprise; 0 = never
+    least_density: float = 1e-6  # m2/s5 that it can be taught
     least_p: float = 0.3  # without a floor a target without noise would freeze the filter
     greatest_p: float = 30.0
     follows_covariance: bool = True  # False: as printed, gains and covariance of the steady state throughout
@@ -99,34 +109,44 @@ def predict(state: Estimate, elapsed_s: Floats) -> Estimate:
     return Estimate(position, velocity, *kept, state.sped_s + t, error)
 
 
+def ahead(state: Estimate, elapsed_s: Floats, fades_in_s: float) -> tuple[Three, Three]:
+    """A look ahead by times (n,): means, and ss, sv, vv without the source error's part, while accelerations fade."""
+    t = elapsed_s[:, None]
+    mean = fading.moved((state.position, state.velocity, state.acceleration), t, fades_in_s)
+    return mean, fading.spread(own_terms(state), t, _shaken(state, state.density), fades_in_s)
+
+
 def covariance(state: Estimate) -> Floats:
     """The covariance now as matrices (n, axes, 3, 3) over position, velocity, acceleration of each axis."""
-    return np.moveaxis(np.array(_whole(state))[PLACES], (0, 1), (-2, -1))
+    return matrices(_whole(state))
 
 
 def track_covariance(state: Estimate) -> Floats:
     """The covariance now as matrices (n, 2 axes, 2 axes) over the positions and then the velocities; axes are independent."""
-    ss, sv, _, vv, _, _ = _whole(state)
-    axes = ss.shape[-1]
-    along = np.arange(axes)
-    matrix = np.zeros((*ss.shape[:-1], 2 * axes, 2 * axes))
-    matrix[..., along, along], matrix[..., along + axes, along + axes] = ss, vv
-    matrix[..., along, along + axes] = matrix[..., along + axes, along] = sv
-    return matrix
+    return positions_and_velocities(_whole(state))
 
 
 def _whole(state: Estimate) -> Terms:
     """The covariance's terms now, each (n, axes), with what the position source's error is not known by."""
-    terms = _now(state, state.density)
+    terms = own_terms(state)
     return terms if state.error is None else source_error.spread(terms, state.error)
 
 
+def own_terms(state: Estimate) -> Terms:
+    """ss, sv, sa, vv, va, aa now, each (n, axes), without the source error's part."""
+    return _now(state, state.density)
+
+
 def _now(state: Estimate, density: Floats) -> Terms:
-    """The filter's own terms now, each (n, axes): those of the last update, over the interval since."""
+    """The filter's own terms now: those of the last update, over the interval since."""
+    return carried(state.terms, state.since_s, _shaken(state, density) * state.since_s)
+
+
+def _shaken(state: Estimate, density: Floats) -> Floats:
+    """Growth of the acceleration's variance a second, (n, axes) m2/s5, in the manoeuvre that p shows."""
     # The step grows as p does where gamma is small. A p below 1, of ten residuals, is luck as often as not, and makes
     # nothing surer.
-    step = np.square(np.maximum(state.p, 1.0)) * density * state.since_s
-    return carried(state.terms, state.since_s, step)
+    return np.asarray(np.square(np.maximum(state.p, 1.0)) * density)
 
 
 def update(
@@ -242,7 +262,7 @@ def _lessons(
     surprises = np.concatenate([state.surprises[1:], surprise[None]])
     if tuning.q is None and tuning.learning:
         lesson = np.exp(tuning.learning * (np.minimum(surprise, GREATEST_LESSON) - 1.0))
-        density = np.minimum(np.maximum(density * lesson, LEAST_DENSITY), GREATEST_DENSITY)
+        density = np.minimum(np.maximum(density * lesson, tuning.least_density), GREATEST_DENSITY)
     if not measured.all():
         surprises = np.where(measured, surprises, state.surprises)
         density = np.where(measured, density, state.density)

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from gateway.align import Fix, Plot
 from gateway.estimators import alpha_beta_gamma as light
-from gateway.estimators import source_error
+from gateway.estimators import fading, source_error
 from gateway.estimators.alpha_beta_gamma import WINDOW, Tuning
+from gateway.estimators.axis_covariance import Three
 from gateway.estimators.axis_innovation import Innovation
 from gateway.estimators.completed_plots import completed
 from gateway.estimators.kalman import POSITION, SIZE, VELOCITY, Estimate
@@ -25,7 +26,9 @@ from gateway.fuse.weighting import Model, weigh_literally
 
 Floats = NDArray[np.float64]
 
-_AXES = np.arange(3)
+LONGEST_STEP_S = 10.0  # that an acceleration is held over, two reports of a slow source
+FADES_IN_S = 2.0  # accelerations, in a look ahead
+_S, _V, _E = np.arange(3), np.arange(3, 6), np.arange(6, 9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,19 +41,19 @@ class LightFilter:
     def begin(self, measure: Measure) -> tuple[Estimate, Belief]:
         """See `Estimator`. The same first state as every other estimator's, each axis by itself."""
         first = start_one(measure, self.model)
-        variance = first.covariance[:, _AXES, _AXES]
+        variance = first.covariance[:, _S, _S]
         by_source = np.zeros_like(variance)
         allowed_m = self.model.motion.error_sigma_m
         if isinstance(measure, Fix):
             by_source[:, : 3 if measure.has_height else 2] = 1.0
             variance = variance - by_source * allowed_m**2
-        speed_variance = first.covariance[:, _AXES + 3, _AXES + 3]
+        speed_variance = first.covariance[:, _V, _V]
         known = speed_variance < 0.5 * light.UNKNOWN_SPEED_MPS**2
         velocity = np.where(known, first.mean[:, VELOCITY], np.nan)
         sigma = np.sqrt(np.maximum(variance, 0.0))
         state = light.start(first.mean[:, POSITION], sigma, self.tuning, velocity, np.sqrt(speed_variance))
         state = _with_error(state, source_error.begun(by_source, allowed_m) if allowed_m else None)
-        return _gaussian(state), _packed(state)[0]
+        return _current(state), _packed(state)[0]
 
     def advance(self, before: Sequence[Event], group: Group) -> Advanced:
         """See `Estimator`."""
@@ -61,26 +64,61 @@ class LightFilter:
         else:
             after, told, memory = self._reported(state, group)
         far = told.normalised > FAR_SIGMA**2 * np.maximum(told.measured.sum(axis=1), 1)
-        return Advanced(_gaussian(after), list(_packed(after)), memory, told.outlying, far)
+        return Advanced(_current(after), list(_packed(after)), memory, told.outlying, far)
 
     def ahead(self, events: Sequence[Event], elapsed_s: Floats, *, far: bool) -> tuple[Estimate, Floats]:
         """See `Estimator`."""
         if not events:
             return Estimate(np.zeros((0, SIZE)), np.zeros((0, SIZE, SIZE))), np.zeros((0, 3))
-        return _gaussian(self._carried(events, elapsed_s)), np.full((len(events), 3), np.nan)
+        state = self._loosened(_unpacked(_rows(events)), elapsed_s)
+        return _gaussian(*self._faded(state, elapsed_s)), np.full((len(events), 3), np.nan)
 
     def directions(self, event: Event) -> Floats:
         """See `Estimator`."""
         return np.full(3, np.nan)
 
     def _carried(self, events: Sequence[Event], elapsed_s: Floats) -> light.Estimate:
-        rows = [event.belief for event in events if isinstance(event.belief, np.ndarray)]
-        state = light.predict(_unpacked(rows), elapsed_s)
+        """The filter's own step. Beyond a long one, nothing is known of the acceleration any more."""
+        before = self._loosened(_unpacked(_rows(events)), elapsed_s)
+        state = light.predict(before, elapsed_s)
+        silent = (elapsed_s > LONGEST_STEP_S)[:, None]
+        if not silent.any():
+            return state
+        (position, velocity, _), (ss, sv, vv), error = self._faded(before, elapsed_s)
+        zero, sure = np.zeros_like(ss), np.full_like(ss, light.UNKNOWN_ACCELERATION_MPS2**2)
+        return light.Estimate(
+            np.where(silent, position, state.position),
+            np.where(silent, velocity, state.velocity),
+            np.where(silent, zero, state.acceleration),
+            np.where(silent, np.stack([ss, sv, zero, vv, zero, sure]), state.terms),
+            np.where(silent, zero, state.since_s),
+            state.density,
+            state.surprises,
+            state.p,
+            state.sped_s,
+            None if error is None or state.error is None else np.where(silent, error, state.error),
+        )
+
+    def _faded(self, state: light.Estimate, elapsed_s: Floats) -> tuple[Three, Three, Floats | None]:
+        """Means, ss, sv, vv and source errors a time later.
+
+        The acceleration fades, and turns may follow that it tells nothing of: those of the one motion.
+        """
+        mean, (ss, sv, vv) = light.ahead(state, elapsed_s, FADES_IN_S)
+        error, t = state.error, elapsed_s[:, None]
+        if error is not None:
+            done = fading.moved((error[0], error[1], error[2]), t, FADES_IN_S)
+            error = np.stack([*done, error[3], error[4]])
+        turns = np.array(self.model.motion.acceleration_density) * t
+        return mean, (ss + turns * t * t / 3.0, sv + turns * t / 2.0, vv + turns), error
+
+    def _loosened(self, state: light.Estimate, elapsed_s: Floats) -> light.Estimate:
+        """The states with the source's error known less well than a time ago."""
         if state.error is None:
             return state
         motion = self.model.motion
-        allowed = motion.error_sigma_m, motion.error_time_constant_s
-        return _with_error(state, source_error.loosened(state.error, elapsed_s, *allowed))
+        error = source_error.loosened(state.error, elapsed_s, motion.error_sigma_m, motion.error_time_constant_s)
+        return _with_error(state, error)
 
     def _seen_by_radar(self, state: light.Estimate, group: Group) -> tuple[light.Estimate, Innovation]:
         """After plots of one radar, or after reports that were weighed literally against plots."""
@@ -95,7 +133,7 @@ class LightFilter:
         else:
             plots = [measure for measure in group.measures if isinstance(measure, Plot)]
             polar, spread = np.array([plot.polar for plot in plots]), np.array([plot.sigma for plot in plots])
-        known = light.track_covariance(state)[:, _AXES, _AXES]
+        known = light.track_covariance(state)[:, _S, _S]
         position, sigma, share = completed(polar, spread, state.position, known, frame)
         return light.update(state, position, sigma, self.tuning, share=share)
 
@@ -122,7 +160,7 @@ class LightFilter:
             remembered = np.concatenate([memory, off[:, None]], axis=1)
             square = np.where(np.isnan(remembered), 0.0, remembered * remembered)
             mean_square = square.sum(axis=1) / np.maximum((~np.isnan(remembered)).sum(axis=1), 1)
-            sigma = np.sqrt(np.maximum(sigma * sigma, mean_square - known[:, _AXES, _AXES]))
+            sigma = np.sqrt(np.maximum(sigma * sigma, mean_square - known[:, _S, _S]))
             memory = remembered[:, 1:]
         after, told = light.update(
             state, state.position + off, sigma, self.tuning, velocity, speed_sigma, by_source=by_source
@@ -167,18 +205,30 @@ def _with_error(state: light.Estimate, error: Floats | None) -> light.Estimate:
     return light.Estimate(state.position, state.velocity, state.acceleration, *kept, error)
 
 
-def _gaussian(state: light.Estimate) -> Estimate:
+def _current(state: light.Estimate) -> Estimate:
+    mean = state.position, state.velocity, state.acceleration
+    ss, sv, _, vv, _, _ = light.own_terms(state)
+    return _gaussian(mean, (ss, sv, vv), state.error)
+
+
+def _gaussian(mean: Three, own: Three, error: Floats | None) -> Estimate:
     """What everybody reads: position, velocity and source error, with their covariance."""
-    n = len(state.position)
-    covariance = np.zeros((n, SIZE, SIZE))
-    covariance[:, :6, :6] = light.track_covariance(state)
-    if state.error is None:
-        return Estimate(np.concatenate([state.position, state.velocity, np.zeros((n, 3))], axis=1), covariance)
-    place, speed, _, value, variance = state.error
-    for rows, each in ((_AXES, place), (_AXES + 3, speed)):
-        covariance[:, rows, _AXES + 6] = covariance[:, _AXES + 6, rows] = each * variance
-    covariance[:, _AXES + 6, _AXES + 6] = variance
-    return Estimate(np.concatenate([state.position, state.velocity, value], axis=1), covariance)
+    ss, sv, vv = own
+    covariance = np.zeros((len(ss), SIZE, SIZE))
+    value = np.zeros_like(ss)
+    if error is not None:
+        place, speed, _, value, variance = error
+        ss, sv, vv = ss + place * place * variance, sv + place * speed * variance, vv + speed * speed * variance
+        covariance[:, _S, _E] = covariance[:, _E, _S] = place * variance
+        covariance[:, _V, _E] = covariance[:, _E, _V] = speed * variance
+        covariance[:, _E, _E] = variance
+    covariance[:, _S, _S], covariance[:, _V, _V] = ss, vv
+    covariance[:, _S, _V] = covariance[:, _V, _S] = sv
+    return Estimate(np.concatenate([mean[0], mean[1], value], axis=1), covariance)
+
+
+def _rows(events: Sequence[Event]) -> list[Floats]:
+    return [event.belief for event in events if isinstance(event.belief, np.ndarray)]
 
 
 def _packed(state: light.Estimate) -> Floats:

@@ -37,7 +37,8 @@ CALM_TIME, MANOEUVRE_TIME, TURN_TIME = 6.0, 2.0, 1.0  # how much of its time an 
 MODE_LASTS_S = 6.0
 
 # Three sigmas for each degree of freedom, for the three of a position: all of them may lie in one axis.
-LIGHT = Tuning(robust=math.sqrt(3.0) * ROBUST_SIGMA)
+# An aircraft that flies straight for minutes must not teach the light filter that it never turns.
+LIGHT = Tuning(robust=math.sqrt(3.0) * ROBUST_SIGMA, least_density=0.01)
 
 AXES = np.arange(3)
 
