@@ -15,7 +15,8 @@ from collections import Counter
 
 from adapters.mavlink_frames import fields
 from adapters.moments import Moments, Observations
-from adapters.vehicles import Component, Vehicle
+from adapters.vehicle import Vehicle
+from adapters.vehicles import Component
 from gateway.observation import AirData
 
 VFR_HUD, _read_hud = fields("VFR_HUD", "airspeed", "groundspeed", "alt", "climb")

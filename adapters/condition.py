@@ -14,7 +14,8 @@ from dataclasses import replace
 from adapters.mavlink_frames import fields
 from adapters.meters import SECOND
 from adapters.moments import Moments, Observations
-from adapters.vehicles import Component, Vehicle
+from adapters.vehicle import Vehicle
+from adapters.vehicles import Component
 from gateway.observation import VehicleStatus
 
 HEARTBEAT, read_heartbeat = fields("HEARTBEAT", "type", "autopilot", "base_mode", "custom_mode")

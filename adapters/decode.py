@@ -39,7 +39,7 @@ from adapters.signing import advice
 from adapters.unbroken import count_unbroken
 from adapters.vehicles import Component
 from adapters.wellbeing import vehicles_health
-from gateway.observation import FlightPlan, Heard, Observation, PlanPoint
+from gateway.observation import Heard, Observation
 from gateway.picture import Health
 
 Observations = tuple[Observation, ...]
@@ -79,8 +79,7 @@ class Decoder:
         self._listened: dict[int, Listened] = {}
         self._notes = self._mavlink.notes
         self._radar_clocks = RadarClocks(self._epoch, self._notes)
-        self._plans: dict[str, tuple[PlanPoint, ...]] = {}  # that were told, by aircraft
-        self._unclaimed: tuple[PlanPoint, ...] | None = None  # told of the first vehicle heard, and none was yet
+        self._plans = told.ToldPlans(self._mavlink.registry)
         self._health: tuple[int, int, Health] | None = None
         for source in sources:
             self.add(source)
@@ -132,7 +131,7 @@ class Decoder:
             left.tolist(), heads[left].tolist(), senders[left].tolist(), passing.tolist(), strict=True
         ):
             arrival = arrivals[place]
-            if passes and self._unclaimed is None and self._epoch.offset_s is not None:
+            if passes and not self._plans.waits and self._epoch.offset_s is not None:
                 self._gather(gathered, place, arrival, components[sender], head >> 24)
                 continue
             gathered.close()
@@ -162,9 +161,7 @@ class Decoder:
         listened = self._listened[number]
         was_settled = self._epoch.offset_s is not None
         found = self._mavlink.read(component, message, payload_of(data, message), received_at, listened.counters)
-        if self._plans or self._unclaimed:
-            found = self._with_plans(found, received_at)
-        return self._as_heard(found, listened, received_at, was_settled)
+        return self._as_heard(self._with_plans(found, received_at), listened, received_at, was_settled)
 
     def hear(self, arrival: Arrival, head: Head = NO_HEAD) -> Heard | None:
         """One MAVLink frame, radar datagram or told line; None where it observed nothing and there is nothing to say.
@@ -265,7 +262,7 @@ class Decoder:
             component = self._mavlink.registry.components.get((arrival.source, frame.system, frame.component))
             if component is not None:
                 listened.components[place] = component
-        return self._with_plans(found, arrival.received_at) if self._plans or self._unclaimed else found
+        return self._with_plans(found, arrival.received_at)
 
     def _hear_told(self, arrival: Arrival, listened: Listened) -> Observations:
         plan = told.decode(arrival.data)
@@ -273,28 +270,11 @@ class Decoder:
             listened.counters["not understood"] += 1
             return ()
         listened.counters["plans"] += 1
-        if plan.aircraft == told.ANYBODY:
-            self._unclaimed = plan.points
-            return self._with_plans((), arrival.received_at)
-        return (self._tell(plan.aircraft, plan.points, arrival.received_at),)
-
-    def _tell(self, aircraft: str, points: tuple[PlanPoint, ...], received_at: int) -> FlightPlan:
-        self._plans[aircraft] = points
-        return FlightPlan(aircraft, self._epoch.session_time(received_at), received_at, points)
+        return self._plans.hear(plan, self._epoch.session_time(arrival.received_at), arrival.received_at)
 
     def _with_plans(self, found: Observations, received_at: int) -> Observations:
-        """What was told of the first vehicle heard, once there is one; and a home that is heard leaves a told plan whole."""
-        if self._unclaimed is not None and (vehicles := self._mavlink.registry.vehicles()):
-            found = (*found, self._tell(vehicles[0].name, self._unclaimed, received_at))
-            self._unclaimed = None
-        return tuple(self._joined(one) if isinstance(one, FlightPlan) else one for one in found)
-
-    def _joined(self, plan: FlightPlan) -> FlightPlan:
-        kept = self._plans.get(plan.aircraft)
-        if kept is None or any(point.kind != "home" for point in plan.points):
-            return plan
-        points = (*plan.points, *(point for point in kept if point.kind != "home"))
-        return FlightPlan(plan.aircraft, plan.valid_at, plan.received_at, points)
+        """What was heard, and what was told that becomes of it."""
+        return self._plans.joined(found, self._epoch.session_time(received_at), received_at) if self._plans else found
 
     def _hear_radar(self, arrival: Arrival, listened: Listened) -> Observations:
         origin = listened.source.origin if not arrival.peer else f"{arrival.peer} on {listened.source.origin}"

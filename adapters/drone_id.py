@@ -26,7 +26,7 @@ from adapters.mavlink_frames import fields
 from adapters.moments import Moments, Observations, When
 from adapters.positions import DEGE7, show
 from adapters.traffic import Traffic
-from adapters.vehicles import Vehicle
+from adapters.vehicle import Vehicle
 from gateway.observation import GpsReport
 
 _PLACE = ("latitude", "longitude", "altitude_barometric", "altitude_geodetic", "timestamp", "status")

@@ -25,7 +25,8 @@ from adapters.missions import mission_intent
 from adapters.moments import Moments, Observations, When
 from adapters.positions import DEGE7, show
 from adapters.roles import ARDUPILOT, PX4
-from adapters.vehicles import Component, Vehicle
+from adapters.vehicle import Vehicle
+from adapters.vehicles import Component
 from gateway.observation import AirData, GpsReport, Observation
 
 _PLACE = ("timestamp", "latitude", "longitude", "altitude", "heading", "eph", "epv", "failure_flags")

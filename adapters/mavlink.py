@@ -28,7 +28,8 @@ from adapters.epoch import SessionEpoch
 from adapters.mavlink_frames import Frame
 from adapters.moments import Moments, Observations, Reader
 from adapters.plans import MISSION_MESSAGES, overheard
-from adapters.vehicles import Component, Registry, Vehicle
+from adapters.vehicle import Vehicle
+from adapters.vehicles import Component, Registry
 from gateway.observation import FlightPlan
 
 _READERS: MappingProxyType[int, Reader] = MappingProxyType(

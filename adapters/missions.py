@@ -15,7 +15,8 @@ from adapters.mavlink_frames import fields
 from adapters.moments import Moments, Observations
 from adapters.positions import is_altitude
 from adapters.roles import PX4
-from adapters.vehicles import Component, Vehicle
+from adapters.vehicle import Vehicle
+from adapters.vehicles import Component
 from gateway.observation import FlightPlan, Intent
 
 HOME_POSITION, _read_home = fields("HOME_POSITION", "latitude", "longitude", "altitude")

@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from adapters.clock import LIMIT_NS
 from adapters.epoch import SessionEpoch
 from adapters.meters import SECOND, SpeedMeter
-from adapters.vehicles import Component, Vehicle
+from adapters.vehicle import Vehicle
+from adapters.vehicles import Component
 from gateway.observation import Observation, Timing
 
 Observations = tuple[Observation, ...]

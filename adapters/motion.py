@@ -21,7 +21,8 @@ from typing import Any
 from adapters.mavlink_frames import fields
 from adapters.moments import Moments, Observations, Reader, When
 from adapters.roles import ARDUPILOT
-from adapters.vehicles import Component, Vehicle
+from adapters.vehicle import Vehicle
+from adapters.vehicles import Component
 from gateway.observation import AirData, Attitude, ImuSample, Observation
 
 ATTITUDE, _read_attitude = fields("ATTITUDE", "time_boot_ms", "roll", "pitch", "yaw")

@@ -19,7 +19,8 @@ from collections import Counter
 from adapters.fixes import COVARIANCE, ESTIMATE, KINDS, RECEIVER, Fix, Fixes
 from adapters.mavlink_frames import fields
 from adapters.moments import Moments, Observations
-from adapters.vehicles import Component, Vehicle
+from adapters.vehicle import Vehicle
+from adapters.vehicles import Component
 from gateway.observation import GpsReport
 
 _PLACE = ("lat", "lon", "alt", "relative_alt", "vx", "vy", "vz")

@@ -15,7 +15,8 @@ from collections import Counter
 from adapters.mavlink_frames import fields
 from adapters.moments import Moments, Observations
 from adapters.positions import DEGE7
-from adapters.vehicles import Component, Vehicle
+from adapters.vehicle import Vehicle
+from adapters.vehicles import Component
 from gateway.observation import Truth
 
 SIM_STATE, _read_sim_state = fields("SIM_STATE", "lat_int", "lon_int", "lat", "lon", "alt", "vn", "ve", "vd")

@@ -15,7 +15,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
-from gateway.observation import PlanPoint
+from adapters.vehicles import Registry
+from gateway.observation import FlightPlan, Observation, PlanPoint
+
+Observations = tuple[Observation, ...]
 
 ANYBODY = "*"
 LONGEST_LINE = 4_000_000
@@ -95,3 +98,45 @@ def _number(told: object, most: float) -> float | None:
     if isinstance(told, bool) or not isinstance(told, int | float):
         return None
     return float(told) if abs(told) <= most else None
+
+
+class ToldPlans:
+    """The plans told in a session, and whose they are; what a vehicle tells of its home leaves them whole."""
+
+    def __init__(self, registry: Registry) -> None:
+        self._registry = registry
+        self._plans: dict[str, tuple[PlanPoint, ...]] = {}  # by aircraft
+        self._unclaimed: tuple[PlanPoint, ...] | None = None
+
+    def __bool__(self) -> bool:
+        return self.waits or bool(self._plans)
+
+    @property
+    def waits(self) -> bool:
+        """Whether a plan is for the first vehicle that will be heard."""
+        return self._unclaimed is not None
+
+    def hear(self, plan: ToldPlan, now: int, received_at: int) -> Observations:
+        """A plan was told: at `now` in the session's time, at a stamp."""
+        if plan.aircraft == ANYBODY:
+            self._unclaimed = plan.points
+            return self.joined((), now, received_at)
+        return (self._keep(plan.aircraft, plan.points, now, received_at),)
+
+    def joined(self, found: Observations, now: int, received_at: int) -> Observations:
+        """What was heard, with a plan that waited for its vehicle; and plans that tell but a home with the points told."""
+        if self._unclaimed is not None and (vehicles := self._registry.vehicles()):
+            found = (*found, self._keep(vehicles[0].name, self._unclaimed, now, received_at))
+            self._unclaimed = None
+        return tuple(self._whole(one) if isinstance(one, FlightPlan) else one for one in found)
+
+    def _keep(self, aircraft: str, points: tuple[PlanPoint, ...], now: int, received_at: int) -> FlightPlan:
+        self._plans[aircraft] = points
+        return FlightPlan(aircraft, now, received_at, points)
+
+    def _whole(self, plan: FlightPlan) -> FlightPlan:
+        kept = self._plans.get(plan.aircraft)
+        if kept is None or any(point.kind != "home" for point in plan.points):
+            return plan
+        points = (*plan.points, *(point for point in kept if point.kind != "home"))
+        return FlightPlan(plan.aircraft, plan.valid_at, plan.received_at, points)

@@ -21,7 +21,8 @@ from adapters.fixes import UTM, is_place
 from adapters.mavlink_frames import fields
 from adapters.moments import Moments, Observations, When
 from adapters.positions import DEGE7, is_altitude, show
-from adapters.vehicles import Component, Vehicle
+from adapters.vehicle import Vehicle
+from adapters.vehicles import Component
 from gateway.observation import GpsReport, Intent
 
 _FIELDS = ("time", "lat", "lon", "alt", "vx", "vy", "vz", "h_acc", "v_acc", "vel_acc", "flags")

@@ -21,10 +21,9 @@ from adapters.clock import SourceClock
 from adapters.fixes import Fixes
 from adapters.likeness import ATTITUDE, GLOBAL_POSITION_INT, Likeness, Trace
 from adapters.meters import Rates
-from adapters.plans import PlanBook
 from adapters.roles import by_heartbeat, by_number, is_vehicle
 from adapters.sequences import SequenceCheck, Siblings
-from gateway.observation import VehicleStatus
+from adapters.vehicle import Vehicle
 
 SYSTEM_TIME = 2
 _UTC = Struct("<QI")
@@ -33,42 +32,7 @@ _TIMED = {26: 4, 27: 8, 29: 4, ATTITUDE: 4, 31: 4, 32: 4, GLOBAL_POSITION_INT: 4
 _ALIVE_NS = 5 * 10**9
 _TELLS_NS = 3 * 10**9  # after so long a silence another link's word is taken
 _REMEMBERED = 256
-_TIMES = 1024
 _COMPONENTS_AT_MOST = 2048  # of a session; each holds a clock, some 9 kB
-
-
-@dataclass(slots=True)
-class Vehicle:
-    """One vehicle, over all links that carry it."""
-
-    name: str
-    system: int
-    fixes: Fixes
-    plan: PlanBook = field(default_factory=PlanBook)
-    sources: set[int] = field(default_factory=set)
-    last_heard: int = 0  # stamp
-    first_heartbeat: int | None = None  # session time
-    has_position_warning: bool = False
-    has_sim_state: bool = False
-    fix_notes: int = 0
-    had_fix: bool = False
-    status: VehicleStatus | None = None  # what its last heartbeat said
-    last_attitude: int = -1  # time since boot, ns
-    attitude_rad: tuple[float, float, float] | None = None  # what it last said, for people
-    inertial: dict[int, list[tuple[float, float, float] | None]] = field(default_factory=dict)  # likewise, by sensor
-    readings: dict[str, float] = field(default_factory=dict)  # what it last said, for people: "airspeed, m/s": 21.3
-    words: dict[str, str] = field(default_factory=dict)  # and in words: "landed": "on ground"
-    told: dict[tuple[int, int, bytes], int] = field(default_factory=dict)  # (component, message, time): its source
-    tellers: dict[tuple[int, int], tuple[int, int]] = field(default_factory=dict)  # (component, message): source, stamp
-
-    def is_told(self, component: Component, message: int, time: bytes) -> bool:
-        """Whether another link has told what this component's message says of this time, as its payload has it."""
-        source, _, number = component.key
-        key = (number, message, time)
-        teller = self.told.setdefault(key, source)
-        if len(self.told) > _TIMES:
-            del self.told[next(iter(self.told))]
-        return teller != source
 
 
 @dataclass(slots=True)
@@ -269,7 +233,7 @@ class Registry:
             return False  # each link's clock is its own
         size = _TIMED.get(message)
         if size is not None:
-            return vehicle.is_told(component, message, payload[:size])
+            return vehicle.is_told(source, number, message, payload[:size])
         key = (number, message)
         teller = vehicle.tellers.get(key)
         if teller is not None and teller[0] != source and received_at - teller[1] < _TELLS_NS:

@@ -7,7 +7,8 @@ import math
 from adapters import motion
 from adapters.epoch import SessionEpoch
 from adapters.mavlink_frames import message_name
-from adapters.vehicles import Component, Registry, Vehicle
+from adapters.vehicle import Vehicle
+from adapters.vehicles import Component, Registry
 from gateway.observation import Timing
 from gateway.picture import VehicleHealth
 

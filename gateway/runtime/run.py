@@ -10,7 +10,6 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from operator import itemgetter
 from pathlib import Path
 
 from adapters import Arrival, Source
@@ -31,7 +30,6 @@ from gateway.runtime.setup import Place, RunFailure, Setup
 from gateway.runtime.summary import Summary, Tally
 
 _FLUSH_NS = 500_000_000  # of wall time: half of the second that a kill may cost
-_SOURCE = itemgetter(1)  # of an Arrival
 
 
 class Run:
@@ -48,7 +46,7 @@ class Run:
         self._watermark = started_at
         self._first_at: int | None = None
         self._sources: dict[int, Source] = {}
-        self._arrivals: dict[int, int] = {}
+        self._arrivals: Counter[int] = Counter()  # by source
         signing = None if setup.signing_key is None else SigningGuard(setup.signing_key, setup.live)
         self._decoder = Decoder([], keys=setup.keys, live=setup.live, signing=signing)
         self._state: State | None = None
@@ -108,7 +106,6 @@ class Run:
     def add(self, source: Source) -> None:
         """A source that is new."""
         self._sources[source.number] = source
-        self._arrivals[source.number] = 0
         self._decoder.add(source)
         if self._recorder is not None:
             try:
@@ -156,17 +153,12 @@ class Run:
         return self._decode(arrivals, heads)
 
     def _decode(self, arrivals: Sequence[Arrival], heads: Sequence[Head] | None = None) -> list[Heard]:
-        for source, number in Counter(map(_SOURCE, arrivals)).items():
-            self._arrivals[source] += number
+        self._arrivals.update([source for _, source, _, _ in arrivals])
         if self.outputs is not None and self.outputs.publishes_on:
             arrivals, heads = self._without_our_own(arrivals, self.outputs), None
         said, refused = self._decoder.hear_many(arrivals, heads)
         if self._recorder is not None:
-            for place in refused:
-                self._recorder.refuse(arrivals[place])
-            apart = set(refused)
-            kept = [one for place, one in enumerate(arrivals) if place not in apart] if apart else arrivals
-            self._recorder.keep_all(kept)
+            self._recorder.keep_all(arrivals, refused)
         if not self.setup.options.mutes:
             return [heard for _, heard in said]
         left = (self._muting.without_muted(heard, arrivals[place].received_at) for place, heard in said)

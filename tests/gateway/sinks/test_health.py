@@ -78,7 +78,8 @@ def test_a_reading_that_is_told_later_gets_a_series_of_its_own_and_moves_no_othe
         rows.append(replace(picture, health=Health((), (replace(vehicle, readings=told),))))
     entities = drawn(tmp_path, rows)
     values = [row["Scalars:scalars"] for row in entities["/health/reading/mps/mavlink\\:1"]]
-    assert values[0][0] == 5.0 and values[-1] == [6.0, 1.0]
+    assert values[0][0] == 5.0
+    assert values[-1] == [6.0, 1.0]
 
 
 def test_when_the_session_goes_back_in_time_health_is_drawn_on(pictures):
