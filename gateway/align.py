@@ -134,9 +134,9 @@ class Geoid:
 
 
 def place_reports(
-    reports: Sequence[GpsReport], heights_m: Sequence[float], site: Site, frame: RunwayFrame
+    reports: Sequence[GpsReport], serials: Sequence[int], heights_m: Sequence[float], site: Site, frame: RunwayFrame
 ) -> list[Fix]:
-    """GPS reports as fixes (serial 0); all of a step in one call: arrays of one cost as much as arrays of a hundred.
+    """GPS reports as fixes; all of a step in one call: arrays of one cost as much as arrays of a hundred.
 
     Source: 003 2.2 eq 1, 2.
     """
@@ -164,7 +164,7 @@ def place_reports(
         fixes.append(
             Fix(
                 report.valid_at,
-                0,
+                serials[row],
                 report.received_at,
                 report.aircraft,
                 enu[row],

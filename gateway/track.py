@@ -10,6 +10,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 from gateway.align import SECOND, Plot
 
@@ -96,6 +97,7 @@ def table(tracks: RadarTracks, untracked: int) -> Tracked:
     return Tracked(tuple(sorted({name_of(key) for key in tracks.plots})), untracked)
 
 
+@lru_cache(maxsize=4096)
 def name_of(key: Key) -> str:
     """How people write a radar track: "1/3" is radar 1, track 3."""
     return f"{key[0]}/{key[1]}"

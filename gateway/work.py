@@ -133,7 +133,6 @@ class Work:
             self.serial += 1
             if isinstance(observation, GpsReport):
                 fix, geoid = next(self._placed)
-                fix = replace(fix, serial=self.serial)
                 if geoid is not self.geoid and geoid.separation_m != self.geoid.separation_m:
                     self._settle()  # what waits is written with the geoid that was known when it was heard
                 self.geoid = geoid
@@ -153,14 +152,17 @@ class Work:
     def _place(self, heard: Sequence[Heard]) -> Iterator[tuple[Fix, Geoid]]:
         """All GPS reports of the step as fixes in one batch, each with what was known of the geoid at its turn."""
         reports, heights, geoids, geoid = [], [], [], self.geoid
+        serial, serials = self.serial, []
         for arrival in heard:
             for report in arrival.observations:
+                serial += 1
                 if isinstance(report, GpsReport):
                     geoid = geoid.learn(report)
                     reports.append(report)
+                    serials.append(serial)
                     heights.append(geoid.height_m(report))
                     geoids.append(geoid)
-        return zip(align.place_reports(reports, heights, self.site, self.frame), geoids, strict=True)
+        return zip(align.place_reports(reports, serials, heights, self.site, self.frame), geoids, strict=True)
 
     def _placed_plot(self, observation: RadarPlot) -> Plot | None:
         """A plot with what register learnt taken off, or None where its radar's place or its time is not known."""
@@ -234,8 +236,8 @@ class Work:
         """Reports wait for the plots about them; plots that came late repeat the checks they touch; what is due is checked."""
         for fix in fixes:
             self.association = associate.await_plots(self.association, fix)
-        for plot, _ in tracked:
-            self._move(associate.check_again(self.association, plot, self.tracks, self.setting))
+        for plot, key in tracked:
+            self._move(associate.check_again(self.association, plot, key, self.tracks, self.setting))
         self._check_due()
 
     def _next_check(self) -> int:
@@ -244,14 +246,17 @@ class Work:
 
     def _check_due(self) -> None:
         """The checks whose wait is over."""
-        while (fix := self.association.due) is not None and fix.at + self.wait <= (self.now or 0):
-            after = associate.check_due(self.association, self.tracks, self.setting)
-            self.checks += [check for check in after.checks if check.fix is fix]
+        until = (self.now or 0) - self.wait
+        while (fix := self.association.due) is not None and fix.at <= until:
+            after, made = associate.check_due(self.association, until, self.tracks, self.setting)
+            self.checks += made
             self._move(after)
 
     def _move(self, after: Association) -> None:
         """A new state of association: the plots of pairs made, lost or moved in time change their system tracks."""
         old = self.association
+        if after is old:
+            return
         if after.ledger.spans != old.ledger.spans:
             self._settle()  # what waits is written under the pairs that were known when it was heard
         self.association = after

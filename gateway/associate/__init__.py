@@ -21,7 +21,7 @@ from gateway.associate.checks import (
     table,
 )
 from gateway.associate.gates import Comparison, Setting
-from gateway.associate.ledger import Change, Count, Ledger, Span, aircraft_of, ordinal_of
+from gateway.associate.ledger import Change, Count, Ledger, Span, Spans, aircraft_of, ordinal_of
 
 __all__ = [
     "Associated",
@@ -33,6 +33,7 @@ __all__ = [
     "Ledger",
     "Setting",
     "Span",
+    "Spans",
     "aircraft_of",
     "await_plots",
     "check_again",

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import math
+from bisect import bisect_left, bisect_right, insort
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix, Plot
-from gateway.associate.gates import SILENT_S, Comparison, Setting, compare
-from gateway.associate.ledger import Change, Count, Ledger, count
+from gateway.associate.gates import SILENT_S, Comparison, Nearby, Setting, compare, compare_again
+from gateway.associate.ledger import FAST_CHECKS_S, Change, Ledger, Spans, count
 from gateway.track import Key, RadarTracks, name_of
 
 Floats = NDArray[np.float64]
@@ -62,99 +63,133 @@ class Association:
     ledger: Ledger = Ledger()
     checks: tuple[Check, ...] = ()
     waiting: tuple[Fix, ...] = ()  # in order of validity
+    chosen: Mapping[str, tuple[Fix, ...]] = field(default_factory=dict)  # each aircraft's reports of both, in order
 
     @property
     def due(self) -> Fix | None:
         """The next report to be checked."""
         return self.waiting[0] if self.waiting else None
 
+    def gap_s(self, fix: Fix) -> float:
+        """How long before a report the last one before it of the same aircraft was checked; only a short gap matters."""
+        before = [other.at for other in self.chosen.get(fix.aircraft, ()) if other.at < fix.at]
+        return (fix.at - before[-1]) / SECOND if before else math.inf
+
 
 def await_plots(state: Association, fix: Fix) -> Association:
     """The same with a report waiting to be checked; the earliest of each second of each aircraft is."""
+    known = state.chosen.get(fix.aircraft, ())
     second = fix.at // SECOND
-
-    def same(other: Fix) -> bool:
-        return other.aircraft == fix.aircraft and other.at // SECOND == second
-
-    rival = next((other for other in state.waiting if same(other)), None)
-    done = next((check.fix for check in state.checks if same(check.fix)), None)
-    earlier = [
-        other for other in (rival, done) if other is not None and (other.at, other.serial) <= (fix.at, fix.serial)
-    ]
-    if earlier or not fix.comparable:
+    rival = next((other for other in reversed(known) if other.at // SECOND == second), None)
+    if not fix.comparable or (rival is not None and (rival.at, rival.serial) <= (fix.at, fix.serial)):
         return state
-    waiting = [other for other in state.waiting if other is not rival]
-    place = bisect_right(waiting, (fix.at, fix.aircraft), key=lambda other: (other.at, other.aircraft))
-    return replace(state, waiting=(*waiting[:place], fix, *waiting[place:]))
+    waiting = state.waiting if rival is None else tuple(other for other in state.waiting if other is not rival)
+    place = bisect_right(waiting, (fix.at, fix.aircraft), key=_validity)
+    others = [other for other in known if other is not rival]
+    insort(others, fix, key=_validity)
+    return Association(
+        state.ledger,
+        state.checks,
+        (*waiting[:place], fix, *waiting[place:]),
+        {**state.chosen, fix.aircraft: tuple(others)},
+    )
 
 
-def check_due(state: Association, tracks: RadarTracks, setting: Setting) -> Association:
-    """The same with the first waiting report checked, wherever among the checks its validity belongs."""
-    fix, rest = state.waiting[0], state.waiting[1:]
-    second = fix.at // SECOND
-    kept = tuple(c for c in state.checks if not (c.fix.aircraft == fix.aircraft and c.fix.at // SECOND == second))
-    place = bisect_left(kept, (fix.at, fix.aircraft), key=lambda check: check.order)
-    if len(kept) < len(state.checks):  # a report of the same second was checked already: begin where either stands
-        place = min(
-            place, next(i for i, (a, b) in enumerate(zip((*kept, None), state.checks, strict=False)) if a is not b)
-        )
-    before = state.checks[place].before if place < len(state.checks) else state.ledger
-    tail: list[Compared] = [(check.fix, check.comparisons, check.alive) for check in kept[place:]]
-    own = bisect_left(kept, (fix.at, fix.aircraft), key=lambda check: check.order) - place
-    tail.insert(own, (fix, *compare(fix, tracks, setting)))
-    return _fold(replace(state, waiting=rest, checks=kept[:place], ledger=before), tail, setting)
+def _validity(fix: Fix) -> tuple[int, str]:
+    return fix.at, fix.aircraft
 
 
-def check_again(state: Association, plot: Plot, tracks: RadarTracks, setting: Setting) -> Association:
-    """The same after a plot that came when checks it touches were done already."""
+def check_due(state: Association, until: int, tracks: RadarTracks, setting: Setting) -> tuple[Association, list[Check]]:
+    """The same with the waiting reports up to an instant checked, up to the first that makes, ends or moves a pair.
+
+    And the checks that were made. A report goes wherever among the checks its validity belongs.
+    """
+    made: list[Check] = []
+    spans, near = state.ledger.spans, Nearby(tracks)
+    checks, ledger, done = list(state.checks), state.ledger, 0
+    for fix in state.waiting:
+        if fix.at > until or ledger.spans != spans:
+            break
+        done += 1
+        compared = (fix, *compare(fix, near, setting))
+        if not checks or checks[-1].order < (fix.at, fix.aircraft):
+            place = len(checks)
+            tail = [compared]
+        else:
+            place, tail = _among(checks, compared)
+        ledger = checks[place].before if place < len(checks) else ledger
+        del checks[place:]
+        ledger = _fold(checks, ledger, tail, state, setting)
+        made += [check for check in checks[place:] if check.fix is fix]
+    return Association(ledger, tuple(checks), state.waiting[done:], state.chosen), made
+
+
+def _among(checks: Sequence[Check], compared: Compared) -> tuple[int, list[Compared]]:
+    """From which check on a late report changes them, and what is to be counted from there."""
+    fix, second = compared[0], compared[0].at // SECOND
+    place = bisect_left(checks, (fix.at, fix.aircraft), key=lambda check: check.order)
+    same = [i for i, c in enumerate(checks) if c.fix.aircraft == fix.aircraft and c.fix.at // SECOND == second]
+    start = min([place, *same])  # a report of the same second was checked already: begin where either stands
+    tail = [(c.fix, c.comparisons, c.alive) for i, c in enumerate(checks[start:], start) if i not in same]
+    tail.insert(sum(i not in same for i in range(start, place)), compared)
+    return start, tail
+
+
+def check_again(state: Association, plot: Plot, key: Key, tracks: RadarTracks, setting: Setting) -> Association:
+    """The same after a plot of a radar track that came when checks it touches were done already."""
     wait = int(setting.options.association_wait_s * SECOND)
+    if not state.checks or state.checks[-1].fix.at < plot.at - wait:
+        return state
     first = bisect_left(state.checks, (plot.at - wait, ""), key=lambda check: check.order)
     last = bisect_right(state.checks, (plot.at + int(SILENT_S * SECOND), "\uffff"), key=lambda check: check.order)
     renewed: dict[int, Compared] = {}
     for place in range(first, last):
         check = state.checks[place]
-        comparisons, alive = compare(check.fix, tracks, setting)
-        same = len(comparisons) == len(check.comparisons) and alive == check.alive
-        if not same or any(new.differs(old) for new, old in zip(comparisons, check.comparisons, strict=True)):
-            renewed[place] = (check.fix, comparisons, alive)
+        compared = compare_again(check.fix, key, check.comparisons, check.alive, tracks, setting)
+        if compared is not None:
+            renewed[place] = (check.fix, *compared)
     if not renewed:
         return state
     start = min(renewed)
     later = range(start, len(state.checks))
     tail = [renewed.get(i, (state.checks[i].fix, state.checks[i].comparisons, state.checks[i].alive)) for i in later]
-    return _fold(replace(state, checks=state.checks[:start], ledger=state.checks[start].before), tail, setting)
+    checks = list(state.checks[:start])
+    ledger = _fold(checks, state.checks[start].before, tail, state, setting)
+    return replace(state, checks=tuple(checks), ledger=ledger)
 
 
 def pruned(state: Association, before: int) -> Association:
     """The same without checks older than an instant and spans that ended before it (the latest of each track stays).
 
-    Aircraft that were last checked long before it, and have no radar track, are forgotten with their counters.
+    Aircraft that were last counted long before it, and have no radar track, are forgotten with their counters.
     """
     checks = tuple(check for check in state.checks if check.fix.at >= before)
     if len(checks) == len(state.checks):
         return state
     spans = state.ledger.spans
     latest = {span.key: span.index for span in spans}
-    kept = tuple(s for s in spans if s.until is None or s.until >= before or s.index == latest[s.key])
-    return replace(state, checks=checks, ledger=_without_gone(replace(state.ledger, spans=kept), before))
+    kept = Spans(s for s in spans if s.until is None or s.until >= before or s.index == latest[s.key])
+    ledger = _without_gone(replace(state.ledger, spans=kept if len(kept) < len(spans) else spans), before)
+    since = before - int(FAST_CHECKS_S * SECOND)
+    chosen = {aircraft: tuple(fix for fix in fixes if fix.at >= since) for aircraft, fixes in state.chosen.items()}
+    return Association(ledger, checks, state.waiting, {aircraft: fixes for aircraft, fixes in chosen.items() if fixes})
 
 
 def _without_gone(ledger: Ledger, before: int) -> Ledger:
-    """The ledger without aircraft that nobody can remember: else each address that ever flew by would stay."""
-    longest = int(FORGOTTEN_S * SECOND)
-    gone = {aircraft for aircraft, at in ledger.checked_at.items() if at < before - longest}
-    gone -= {*ledger.pairs.values(), *(span.aircraft for span in ledger.spans)}
-    if not gone:
-        return ledger
-    checked_at = {aircraft: at for aircraft, at in ledger.checked_at.items() if aircraft not in gone}
-    counts = {pair: count for pair, count in ledger.counts.items() if pair[0] not in gone}
-    return replace(ledger, checked_at=checked_at, counts=counts)
+    """The ledger without the counters of aircraft that nobody can remember."""
+    since = before - int(FORGOTTEN_S * SECOND)
+    kept = {
+        aircraft: counts
+        for aircraft, counts in ledger.counts.items()
+        if aircraft in ledger.spans.by_aircraft or any(one.at >= since for one in counts.values())
+    }
+    return ledger if len(kept) == len(ledger.counts) else replace(ledger, counts=kept)
 
 
 def missing(state: Association, tracks: RadarTracks) -> frozenset[Key]:
     """The radar tracks that the ledger knows and that have no plots any more."""
     ledger = state.ledger
-    known = {*ledger.pairs, *(key for _, key in ledger.counts), *(span.key for span in ledger.spans)}
+    known = {*ledger.spans.by_key, *(key for counts in ledger.counts.values() for key in counts)}
     return frozenset(known - tracks.plots.keys())
 
 
@@ -163,26 +198,29 @@ def forgotten(state: Association, gone: frozenset[Key]) -> Association:
     if not gone:
         return state
     ledger = state.ledger
-    counts = {pair: count for pair, count in ledger.counts.items() if pair[1] not in gone}
-    spans = tuple(span for span in ledger.spans if span.key not in gone)
-    pairs = {key: aircraft for key, aircraft in ledger.pairs.items() if key not in gone}
-    return replace(state, ledger=replace(ledger, counts=counts, pairs=pairs, spans=spans))
+    counts = {
+        aircraft: {key: count for key, count in counts.items() if key not in gone}
+        for aircraft, counts in ledger.counts.items()
+    }
+    counts = {aircraft: left for aircraft, left in counts.items() if left}
+    return replace(state, ledger=Ledger(counts, Spans(span for span in ledger.spans if span.key not in gone)))
 
 
-def _fold(state: Association, compared: Sequence[Compared], setting: Setting) -> Association:
-    """The state after some more checks, in order of validity."""
-    checks, ledger = list(state.checks), state.ledger
+def _fold(
+    checks: list[Check], ledger: Ledger, compared: Sequence[Compared], state: Association, setting: Setting
+) -> Ledger:
+    """The ledger after some more checks, in order of validity, which are put behind those before them."""
     for fix, comparisons, alive in compared:
-        after, changes = count(ledger, fix, comparisons, alive, setting)
+        after, changes = count(ledger, fix, comparisons, alive, state.gap_s(fix), setting)
         checks.append(Check(fix, comparisons, alive, ledger, after, changes))
         ledger = after
-    return replace(state, checks=tuple(checks), ledger=ledger)
+    return ledger
 
 
 def table(checks: Sequence[Check], ledger: Ledger, changes: Sequence[Change]) -> Associated:
     """Some checks as columns, with the pairs of a ledger."""
     rows = [(check, comparison) for check in checks for comparison in check.comparisons]
-    counters = [check.after.counts.get((check.fix.aircraft, c.key), Count(0, 0.0, 0)).value for check, c in rows]
+    counters = [check.after.value(check.fix.aircraft, comparison.key) for check, comparison in rows]
     return Associated(
         check_time=np.array([check.fix.at for check, _ in rows], dtype=np.int64),
         check_aircraft=tuple(check.fix.aircraft for check, _ in rows),
@@ -191,6 +229,6 @@ def table(checks: Sequence[Check], ledger: Ledger, changes: Sequence[Change]) ->
         check_gate=np.array([comparison.gate for _, comparison in rows]).reshape(-1, 3),
         check_hit=np.array([comparison.hit for _, comparison in rows], dtype=np.bool_),
         check_counter=np.array(counters, dtype=np.int64),
-        pairs=tuple(sorted((aircraft, name_of(key)) for key, aircraft in ledger.pairs.items())),
+        pairs=ledger.spans.named_pairs,
         changes=tuple(changes),
     )

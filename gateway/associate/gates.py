@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import compress
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix, Polar, bracket
 from gateway.frames import RadarFrame, RunwayFrame, polar_from_xyz
 from gateway.settings import Options, Site
-from gateway.track import GREATEST_SPEED_MPS, Key, Place, RadarTracks
+from gateway.track import GREATEST_SPEED_MPS, Key, RadarTracks
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 GATE_SIGMAS = 3.0
 IMPOSSIBLE_SIGMAS = 4.0  # a guessed height can forbid a pair beyond this, never support one
@@ -44,24 +52,124 @@ class Setting:
     radars: Mapping[int, RadarFrame]
 
 
-def compare(fix: Fix, tracks: RadarTracks, setting: Setting) -> tuple[tuple[Comparison, ...], frozenset[Key]]:
+class Nearby:
+    """The radar tracks of one moment as columns, for a coarse look at all of them at once. Made when first asked."""
+
+    def __init__(self, tracks: RadarTracks) -> None:
+        self.tracks = tracks
+        self._alive: dict[bytes, frozenset[Key]] = {}
+
+    @cached_property
+    def keys(self) -> list[Key]:
+        """Of the columns' rows."""
+        return list(self.tracks.plots)
+
+    @cached_property
+    def radar(self) -> Ints:
+        """Each track's."""
+        return np.array([key[0] for key in self.keys], np.int64)
+
+    @cached_property
+    def _times(self) -> Ints:
+        """When each track's remembered plots begin and end, (2, n)."""
+        plots = self.tracks.plots.values()
+        return np.array([[some[0].at for some in plots], [some[-1].at for some in plots]], np.int64)
+
+    @cached_property
+    def _places(self) -> tuple[Ints, Floats]:
+        """When each was where, (n,): range, azimuth and their sigmas, (4, n)."""
+        places = [self.tracks.places[key] for key in self.keys]
+        known = [(place.range_m, place.azimuth_rad, place.range_sigma_m, place.azimuth_sigma_rad) for place in places]
+        return np.array([place.at for place in places], np.int64), np.array(known).reshape(-1, 4).T
+
+    def alive(self, first: int, last: int) -> tuple[Bools, frozenset[Key]]:
+        """Which have plots between two instants: by row, and by name."""
+        begins, ends = self._times
+        living = np.asarray((begins <= last) & (ends >= first))
+        mask = living.tobytes()
+        if mask not in self._alive:
+            self._alive[mask] = frozenset(compress(self.keys, living))
+        return living, self._alive[mask]
+
+    def is_far(self, at: int, there: Polar, spread: Polar) -> Bools:
+        """Whether each is too far away to be compared."""
+        then, places = self._places
+        return np.asarray(_is_far(at - then, there, spread, *places))
+
+
+Compared = tuple[tuple[Comparison, ...], frozenset[Key]]  # with which tracks, and the tracks with plots then
+
+
+def compare(fix: Fix, nearby: Nearby, setting: Setting) -> Compared:
     """One report against every radar track with plots near its time that is not far away; and which have such plots.
 
     Source: 003 2.3 eq 6. Deviation: sigma also holds the allowed systematic error of the position source.
     """
-    wait = int(setting.options.association_wait_s * SECOND)
-    first, last = fix.at - int(SILENT_S * SECOND), fix.at + wait
-    alive, found = set(), []
-    seen = {number: _seen_from(fix, radar, setting) for number, radar in setting.radars.items()}
-    for key, plots in tracks.plots.items():
-        if plots[0].at > last or plots[-1].at < first or key[0] not in seen:
-            continue
-        alive.add(key)
-        there, spread = seen[key[0]]
-        if not _is_far(fix.at, there, spread, tracks.places[key]):
-            value, sigma = bracket(plots, fix.at, setting.options.association_wait_s)
-            found.append(_judged(key, value, sigma, fix, there, spread, setting.options.association))
-    return tuple(found), frozenset(alive)
+    if not nearby.tracks.plots:
+        return (), frozenset()
+    living, alive = nearby.alive(*_window(fix, setting))
+    found = []
+    for number, radar in setting.radars.items():
+        seen = living & (nearby.radar == number)
+        if seen.any():
+            there, spread = _seen_from(fix, radar, setting)
+            for row in (seen & ~nearby.is_far(fix.at, there, spread)).nonzero()[0].tolist():
+                key = nearby.keys[row]
+                found.append(_compared(fix, key, nearby.tracks, there, spread, setting))
+    return tuple(found), alive
+
+
+def compare_again(
+    fix: Fix, key: Key, before: Sequence[Comparison], alive: frozenset[Key], tracks: RadarTracks, setting: Setting
+) -> Compared | None:
+    """A report's comparisons after one radar track got another plot, or None where nothing that counts is different."""
+    radar = setting.radars.get(key[0])
+    if radar is None:
+        return None
+    first, last = _window(fix, setting)
+    plots, place = tracks.plots[key], tracks.places[key]
+    lives = plots[0].at <= last and plots[-1].at >= first
+    known = next((one for one in before if one.key == key), None)
+    there, spread = _seen_from(fix, radar, setting)
+    where = (place.range_m, place.azimuth_rad, place.range_sigma_m, place.azimuth_sigma_rad)
+    is_near = lives and not _is_far(fix.at - place.at, there, spread, *where)
+    now = _compared(fix, key, tracks, there, spread, setting) if is_near else None
+    if lives == (key in alive) and (now is known or (now is not None and known is not None and not now.differs(known))):
+        return None
+    others = tuple(one for one in before if one.key != key)
+    return (others if now is None else (*others, now)), (alive | {key} if lives else alive - {key})
+
+
+def _window(fix: Fix, setting: Setting) -> tuple[int, int]:
+    """Between which instants a radar track must have plots to be alive for a report."""
+    return fix.at - int(SILENT_S * SECOND), fix.at + int(setting.options.association_wait_s * SECOND)
+
+
+def _compared(fix: Fix, key: Key, tracks: RadarTracks, there: Polar, spread: Polar, setting: Setting) -> Comparison:
+    """One report against one radar track."""
+    value, sigma = bracket(tracks.plots[key], fix.at, setting.options.association_wait_s)
+    return _judged(key, value, sigma, fix, there, spread, setting.options.association)
+
+
+def _is_far(
+    elapsed: Any,
+    there: Polar,
+    spread: Polar,
+    range_m: Any,
+    azimuth_rad: Any,
+    range_sigma_m: Any,
+    azimuth_sigma_rad: Any,
+) -> Any:
+    """Whether a track's latest range and azimuth, so many ns ago, leave no chance of a hit; of one track or of columns.
+
+    Then nothing need be interpolated.
+    """
+    moved_m = GREATEST_SPEED_MPS * (abs(elapsed) / SECOND + 1.0)
+    off = abs(azimuth_rad - there[1])
+    away = math.pi - abs(math.pi - off)  # both are in (-pi, pi]
+    return (abs(range_m - there[0]) > moved_m + 4.0 * (spread[0] + range_sigma_m)) | (
+        away > moved_m / max(there[0], 300.0) + 4.0 * (spread[1] + azimuth_sigma_rad)
+    )
 
 
 def _seen_from(fix: Fix, radar: RadarFrame, setting: Setting) -> tuple[Polar, Polar]:
@@ -89,20 +197,6 @@ def _judged(key: Key, value: Polar, sigma: Polar, fix: Fix, there: Polar, spread
     found = judge(key, value, sigma, (there[0], there[1], math.nan), spread, rule)
     far_off = abs(value[2] - there[2]) > IMPOSSIBLE_SIGMAS * math.hypot(sigma[2], spread[2])
     return replace(found, hit=False) if far_off and found.hit else found
-
-
-def _is_far(at: int, there: Polar, spread: Polar, place: Place) -> bool:
-    """Whether a radar track's latest range and azimuth leave no chance of a hit, so that nothing need be interpolated."""
-    moved_m = GREATEST_SPEED_MPS * (abs(at - place.at) / SECOND + 1.0)
-    away_m = abs(place.range_m - there[0])
-    if away_m > moved_m + 4.0 * (spread[0] + place.range_sigma_m):
-        return True
-    away = (
-        abs(math.remainder(place.azimuth_rad - there[1], 2.0 * math.pi))
-        if place.azimuth_rad == place.azimuth_rad
-        else 0.0
-    )
-    return away > moved_m / max(there[0], 300.0) + 4.0 * (spread[1] + place.azimuth_sigma_rad)
 
 
 def judge(key: Key, value: Polar, sigma: Polar, there: Polar, spread: Polar, rule: str) -> Comparison:

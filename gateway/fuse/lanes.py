@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from gateway.align import SECOND, Plot
-from gateway.associate import Span
+from gateway.associate import Spans
 from gateway.fuse.filtering import Event
 from gateway.settings import Options
 from gateway.track import Key, name_of
@@ -141,7 +141,7 @@ def contains(lanes: Lanes, track: int | None, plot: Plot) -> bool:
     return False
 
 
-def joined(lanes: Lanes, spans: Sequence[Span]) -> tuple[Lanes, list[Ended]]:
+def joined(lanes: Lanes, spans: Spans) -> tuple[Lanes, list[Ended]]:
     """The lanes with those radar tracks ended that became an aircraft, and those going on that in hindsight did not."""
     ended = []
     for lane in list(lanes.lanes.values()):
@@ -170,19 +170,21 @@ def emptied(lanes: Lanes, at: int) -> tuple[Lanes, list[Ended]]:
     return replace(lanes, lanes=kept, by_key={}, gone={}), ended
 
 
-def joined_at(lane: Lane, spans: Sequence[Span]) -> tuple[int, str] | None:
+def joined_at(lane: Lane, spans: Spans) -> tuple[int, str] | None:
     """When and to which aircraft a radar track's lane went over, or None while it stands alone."""
-    following = [s for s in spans if s.key == lane.key and s.index == lane.ordinal + 1]
+    if lane.key is None:
+        return None
+    following = [s for s in spans.by_key.get(lane.key, ()) if s.index == lane.ordinal + 1]
     return (following[0].since, following[0].aircraft) if following else None
 
 
-def radar_names(lane: Lane, spans: Sequence[Span], at: int) -> str | None:
+def radar_names(lane: Lane, spans: Spans, at: int) -> str | None:
     """The radar tracks behind a lane at an instant, as people write them."""
     if lane.key is not None:
         return name_of(lane.key)
     names = [
         name_of(s.key)
-        for s in spans
-        if s.aircraft == lane.aircraft and s.since <= at and (s.until is None or at < s.until)
+        for s in spans.by_aircraft.get(lane.aircraft or "", ())
+        if s.since <= at and (s.until is None or at < s.until)
     ]
     return " ".join(sorted(set(names))) or None

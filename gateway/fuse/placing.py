@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from gateway.align import SECOND, Fix, Plot, bracket
-from gateway.associate import Span, aircraft_of, ordinal_of
+from gateway.associate import Spans, aircraft_of, ordinal_of
 from gateway.fuse.filtering import Job, Measure, Near, Neighbour, rank
 from gateway.fuse.lanes import Lane, Lanes
 from gateway.fuse.life import lane_of_report
@@ -30,15 +30,15 @@ class Scene:
     """What lanes are built from: the radar tracks, which aircraft they are when, and the options."""
 
     tracks: RadarTracks
-    spans: tuple[Span, ...]
+    spans: Spans
     options: Options
 
     def neighbour(self, lane: Lane) -> Neighbour:
         """The plot of this lane's radar track at a report's time, for the literal weighting."""
 
         def at_time_of(fix: Fix) -> Near | None:
-            for span in self.spans:
-                if span.aircraft != lane.aircraft or aircraft_of(self.spans, span.key, fix.at) != lane.aircraft:
+            for span in self.spans.by_aircraft.get(lane.aircraft or "", ()):
+                if aircraft_of(self.spans, span.key, fix.at) != lane.aircraft:
                     continue
                 # Only plots that are this aircraft's: a late one of those has this report worked again, another has not.
                 known = self.tracks.plots.get(span.key, ())
@@ -84,7 +84,7 @@ def lane_of(lanes: Lanes, plot: Plot, key: Key, scene: Scene) -> int | None:
     return lanes.by_key.get((key, ordinal_of(scene.spans, key, plot.at)))
 
 
-def reroute(lanes: Lanes, old: tuple[Span, ...], scene: Scene) -> tuple[Lanes, list[Job]]:
+def reroute(lanes: Lanes, old: Spans, scene: Scene) -> tuple[Lanes, list[Job]]:
     """The lanes after pairs were made, lost or moved in time; and what of them is to be worked again."""
     from_when: dict[str, int] = {}
     keys: dict[Key, int] = {}
@@ -175,10 +175,9 @@ def _begun_from_plots(lanes: Lanes, key: Key, ordinal: int, scene: Scene) -> tup
 def _plots_of(aircraft: str, scene: Scene) -> list[Plot]:
     """All remembered plots of the radar tracks that are this aircraft, at the times when they are."""
     found = []
-    for span in scene.spans:
-        if span.aircraft == aircraft:
-            plots = scene.tracks.plots.get(span.key, ())
-            found += [plot for plot in plots if plot.at >= span.since and (span.until is None or plot.at < span.until)]
+    for span in scene.spans.by_aircraft.get(aircraft, ()):
+        plots = scene.tracks.plots.get(span.key, ())
+        found += [plot for plot in plots if plot.at >= span.since and (span.until is None or plot.at < span.until)]
     return found
 
 
@@ -187,11 +186,10 @@ def _free_plots(lane: Lane, scene: Scene) -> list[Plot]:
     key = lane.key
     if key is None:
         return []
-    spans = [span for span in scene.spans if span.key == key]
     return [
         plot
         for plot in scene.tracks.plots.get(key, ())
-        if ordinal_of(spans, key, plot.at) == lane.ordinal and aircraft_of(spans, key, plot.at) is None
+        if ordinal_of(scene.spans, key, plot.at) == lane.ordinal and aircraft_of(scene.spans, key, plot.at) is None
     ]
 
 

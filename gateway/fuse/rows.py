@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix
-from gateway.associate import Span
+from gateway.associate import Spans
 from gateway.estimators.kalman import ERROR, POSITION, SIZE, VELOCITY
 from gateway.frames import RunwayFrame, turn
 from gateway.fuse.agreement import CONFIRMED
@@ -77,7 +77,7 @@ class Row:
     life: str
 
 
-def row_of(lane: Lane, event: Event, spans: Sequence[Span], separation_m: float, model: Model) -> Row:
+def row_of(lane: Lane, event: Event, spans: Spans, separation_m: float, model: Model) -> Row:
     """The row that an event of a lane writes."""
     by = "gps" if isinstance(event.measure, Fix) else "radar"
     within = int(SEEN_WITHIN_S * SECOND)
@@ -103,7 +103,7 @@ def row_of(lane: Lane, event: Event, spans: Sequence[Span], separation_m: float,
 
 
 def work(
-    lanes: Lanes, jobs: Sequence[Job], spans: Sequence[Span], separation_m: float, model: Model
+    lanes: Lanes, jobs: Sequence[Job], spans: Spans, separation_m: float, model: Model
 ) -> tuple[Lanes, list[Row], int]:
     """The lanes with some jobs done, the rows that they wrote, and how many new measurements lay outside."""
     rows: list[Row] = []
@@ -117,7 +117,7 @@ def work(
     return lanes.with_lanes(changed), rows, outliers
 
 
-def coast(lanes: Sequence[Lane], at: int, spans: Sequence[Span], separation_m: float, model: Model) -> list[Row]:
+def coast(lanes: Sequence[Lane], at: int, spans: Spans, separation_m: float, model: Model) -> list[Row]:
     """A row for each of some silent lanes, carried on to an instant."""
     if not lanes:
         return []

@@ -182,7 +182,8 @@ def checks(heard: Measures, setting: associate.Setting, until_s: float) -> Itera
             first, last = np.searchsorted(times[key], (fix.at - margin, fix.at + margin))
             if first < last:
                 near[key] = plots[first:last]
-        state = associate.check_due(associate.await_plots(state, fix), RadarTracks(near, _places(near)), setting)
+        tracks = RadarTracks(near, _places(near))
+        state, _ = associate.check_due(associate.await_plots(state, fix), fix.at, tracks, setting)
         state = associate.pruned(state, fix.at - 10 * SECOND)
         yield state, fix
 

@@ -93,7 +93,7 @@ def _draw_association(recording: rr.RecordingStream, seed: int) -> None:
         found = next((c for c in check.comparisons if c.key == fusion.TARGET), None)
         if found is not None:
             time_s.append((fix.at - fusion.START) / SECOND)
-            count = check.after.counts.get((fusion.AIRCRAFT, fusion.TARGET))
+            count = check.after.counts.get(fusion.AIRCRAFT, {}).get(fusion.TARGET)
             shown.append((found, 0 if count is None else count.value))
     times = np.array(time_s)
     hit = np.array([found.hit for found, _ in shown], dtype=np.bool_)

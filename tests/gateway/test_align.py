@@ -238,7 +238,7 @@ def test_a_report_arrives_where_it_said(world: Any) -> None:
     east, north, up = 81.0, -2.0, -3.0
     report = replace(report, velocity_east_mps=east, velocity_north_mps=north, velocity_up_mps=up)
     height = report.altitude_msl_m - 35.0
-    (fix,) = place_reports([report], [height], DEMO_SITE, world.frame)
+    (fix,) = place_reports([report], [1], [height], DEMO_SITE, world.frame)
     wanted = world.frame.enu_from_runway @ course.at(5.0)
     assert fix.enu_m == pytest.approx(wanted, abs=1e-6)
     assert fix.sigma_m.tolist() == [4.0, 4.0, 7.0]
@@ -254,7 +254,7 @@ def test_a_report_without_its_own_accuracy_has_the_sites(world: Any) -> None:
     """Sigmas that the stream does not give are the site's; ones too good to be true are held at 0.3 m and 0.1 m/s."""
     bare = world.report(world.Course(), 1.0)
     proud = replace(bare, horizontal_sigma_m=0.01, velocity_sigma_mps=0.001)
-    first, second = place_reports([bare, proud], [900.0, 900.0], DEMO_SITE, world.frame)
+    first, second = place_reports([bare, proud], [1, 2], [900.0, 900.0], DEMO_SITE, world.frame)
     assert first.sigma_m.tolist() == [15.0] * 3
     assert first.velocity_sigma_mps == 1.0
     assert np.isnan(first.velocity_mps).all()
@@ -268,7 +268,7 @@ def test_a_report_without_its_own_accuracy_has_the_sites(world: Any) -> None:
 )
 def test_only_a_settled_clock_is_compared(world: Any, timing: Timing, comparable: bool) -> None:
     """A report is compared with radar only when its clock is UTC or the settled envelope."""
-    (fix,) = place_reports([world.report(world.Course(), 1.0, timing=timing)], [900.0], DEMO_SITE, world.frame)
+    (fix,) = place_reports([world.report(world.Course(), 1.0, timing=timing)], [1], [900.0], DEMO_SITE, world.frame)
     assert fix.comparable is comparable
 
 
@@ -281,12 +281,12 @@ def test_many_reports_have_the_bits_of_one(world: Any) -> None:
     ]
     heights = [report.altitude_msl_m - 35.0 for report in reports]
     for fix, report, height in zip(
-        place_reports(reports, heights, DEMO_SITE, world.frame), reports, heights, strict=True
+        place_reports(reports, range(len(reports)), heights, DEMO_SITE, world.frame), reports, heights, strict=True
     ):
-        (alone,) = place_reports([report], [height], DEMO_SITE, world.frame)
+        (alone,) = place_reports([report], [1], [height], DEMO_SITE, world.frame)
         assert fix.enu_m.tobytes() == alone.enu_m.tobytes()
         assert fix.velocity_mps.tobytes() == alone.velocity_mps.tobytes()
-    assert place_reports([], [], DEMO_SITE, world.frame) == []
+    assert place_reports([], [], [], DEMO_SITE, world.frame) == []
 
 
 def test_a_plot_has_the_correction_taken_off_and_its_own_sigmas_before_the_sites() -> None:

@@ -36,8 +36,7 @@ class _Told:
         """A pair's counter after each check of the aircraft."""
         checks = [check for check in self.state.checks if check.fix.aircraft == aircraft]
         found = [
-            {key[1]: count.value for (owner, key), count in check.after.counts.items() if owner == aircraft}
-            for check in checks
+            {key[1]: count.value for key, count in check.after.counts.get(aircraft, {}).items()} for check in checks
         ]
         return [one.get(number, 0) for one in found]
 
@@ -51,7 +50,7 @@ def _checked(world: Any, fixes: Iterable[Any], plots: Iterable[Any], **options: 
     for fix in sorted(fixes, key=lambda fix: fix.at):
         state = await_plots(state, fix)
         if state.due is not None:
-            state = check_due(state, tracks, setting)
+            state, _ = check_due(state, fix.at, tracks, setting)
     return _Told(state)
 
 
@@ -342,4 +341,4 @@ def test_a_miss_against_anothers_track_leaves_no_counter(world: Any) -> None:
     other = _fixes(world, course, [t + 1.5 for t in FIVE_SECONDS], aircraft="mavlink:9", off_m=(0.0, 800.0, 0.0))
     told = _checked(world, [*mine, *other], _plots(world, course))
     assert told.pairs == {"1/3": ONE}
-    assert {owner for owner, _ in told.state.ledger.counts} == {ONE}
+    assert {*told.state.ledger.counts} == {ONE}
