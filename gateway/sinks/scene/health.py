@@ -23,6 +23,7 @@ from gateway.sinks.scene.samples import Sample, plotted
 SAMPLE_NS = 1_000_000_000  # people read it: once a second
 VEHICLES_ABREAST = 5  # columns that can be read side by side
 VEHICLES_AT_MOST = 25
+_SERIES_AT_MOST = 4096  # entities whose series are remembered; one that is forgotten numbers its series anew
 
 VEHICLES, SOURCES = "/health/table/vehicles", "/health/table/sources"
 
@@ -33,10 +34,7 @@ class HealthScene:
     def __init__(self) -> None:
         self._sampled = BEFORE_ALL
         self._named: Lately[str] = Lately()
-        self._series: dict[
-            str, dict[str, None]
-        ] = {}  # of each entity of readings: what they are called, in their order
-        self._shown: Lately[str] = Lately(self._series.pop)
+        self._series: dict[str, dict[str, None]] = {}  # what those of each entity are called, in their order
         self._tables: dict[str, str] = {}
         self._plans: dict[str, str] = {}  # what each aircraft's plan holds; also those that came from a file
         self._planned: Lately[str] = Lately(self._plans.pop)
@@ -87,8 +85,9 @@ class HealthScene:
 
     def _sample(self, picture: Picture, path: str, values: dict[str, float]) -> Sample:
         """Values by the series that the entity has; what is told for the first time gives it one more."""
-        self._shown.is_new(path, picture.now)
-        series = self._series.setdefault(path, {})
+        series = self._series[path] = self._series.pop(path, {})  # newest last
+        if len(self._series) > _SERIES_AT_MOST:
+            del self._series[next(iter(self._series))]
         if not values.keys() <= series.keys():
             series.update(dict.fromkeys(values))
             self._named.drop(path)

@@ -13,7 +13,7 @@ from gateway.sinks.scene.lately import Lately
 
 
 class Sample(NamedTuple):
-    """One row of a plot: a value for each series, NaN where it has none now. An entity's series only ever become more."""
+    """One row of a plot: a value for each series, NaN where it has none now. Series that come later stand behind."""
 
     path: str
     time: int
@@ -32,7 +32,7 @@ def plotted(samples: Sequence[Sample], named: Lately[str]) -> list[Entry]:
         mine.sort(key=lambda sample: sample.time)
         if named.is_new(path, mine[-1].time):
             entries.append(Always(path, (rr.SeriesLines(names=mine[-1].names),)))
-        table = np.full((len(mine), len(mine[-1].names)), np.nan)
+        table = np.full((len(mine), max(len(sample.values) for sample in mine)), np.nan)
         for row, sample in zip(table, mine, strict=True):
             row[: len(sample.values)] = sample.values
         values = rr.Scalars.columns(scalars=table)
