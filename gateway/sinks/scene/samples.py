@@ -30,9 +30,10 @@ def plotted(samples: Sequence[Sample], named: Lately[str]) -> list[Entry]:
     entries: list[Entry] = []
     for path, mine in found.items():
         mine.sort(key=lambda sample: sample.time)
+        names = max((sample.names for sample in mine), key=len)
         if named.is_new(path, mine[-1].time):
-            entries.append(Always(path, (rr.SeriesLines(names=mine[-1].names),)))
-        table = np.full((len(mine), max(len(sample.values) for sample in mine)), np.nan)
+            entries.append(Always(path, (rr.SeriesLines(names=names),)))
+        table = np.full((len(mine), len(names)), np.nan)
         for row, sample in zip(table, mine, strict=True):
             row[: len(sample.values)] = sample.values
         values = rr.Scalars.columns(scalars=table)
