@@ -18,6 +18,7 @@ GREATEST_SPEED_MPS = 600.0  # beyond any aircraft that a landing radar meets
 GREATEST_SILENCE_S = 10.0
 
 Key = tuple[int, int, int]  # radar, number, episode
+Number = tuple[int, int]  # radar, number
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,20 +57,23 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class RadarTracks:
-    """The recent plots of every radar track, in order of time."""
+    """The recent plots of every radar track, in order of time. A (radar, number, episode) never comes twice."""
 
     plots: Mapping[Key, tuple[Plot, ...]] = field(default_factory=dict)
     places: Mapping[Key, Place] = field(default_factory=dict)
-    episode: Mapping[tuple[int, int], int] = field(default_factory=dict)  # the present one of each number
+    episode: Mapping[Number, int] = field(default_factory=dict)  # the present one of each number
+    closed: Mapping[Key, int] = field(default_factory=dict)  # those that go on under another number, and since when
+    silent: Mapping[Number, int] = field(default_factory=dict)  # numbers without recent plots: when the last one was
+    first_episode: int = 0  # of a number that is not known, or was forgotten
 
     def after(self, plot: Plot) -> tuple[RadarTracks, Key]:
         """The same with one more plot, wherever in time it belongs; and the radar track that took it."""
         number = (plot.radar, plot.number)
-        present = self.episode.get(number, 0)
+        present = self.episode.get(number, self.first_episode)
         key = (*number, present)
         known = self.plots.get(key, ())
-        episodes = self.episode
-        if known and plot.at > known[-1].at and _is_another_target(known, plot):
+        episodes, silent = self.episode, self.silent
+        if self._is_new(key, known, plot):
             key, known = (*number, present + 1), ()
             episodes = {**episodes, number: present + 1}
         elif known and plot.at < known[0].at and (earlier := self.plots.get((*number, present - 1))):
@@ -77,19 +81,49 @@ class RadarTracks:
                 key, known = (*number, present - 1), earlier
         elif number not in episodes:
             episodes = {**episodes, number: present}
+        if number in silent:
+            silent = {other: at for other, at in silent.items() if other != number}
         place = bisect_right(known, (plot.at, plot.serial), key=lambda other: (other.at, other.serial))
         before = self.places.get(key) if known else None
         place_now = (before or Place(plot.at, math.nan, math.nan, *plot.sigma[:2])).then(plot)
         plots = {**self.plots, key: (*known[:place], plot, *known[place:])}
-        return RadarTracks(plots, {**self.places, key: place_now}, episodes), key
+        places = {**self.places, key: place_now}
+        return RadarTracks(plots, places, episodes, self.closed, silent, self.first_episode), key
+
+    def _is_new(self, key: Key, known: tuple[Plot, ...], plot: Plot) -> bool:
+        """Whether a plot with this number begins another radar track than the number's present one."""
+        if not known:
+            return plot.at - self.silent.get(key[:2], plot.at) > GREATEST_SILENCE_S * SECOND
+        if plot.at <= known[-1].at:
+            return False
+        return plot.at >= self.closed.get(key, plot.at + 1) or _is_another_target(known, plot)
+
+    def closing(self, key: Key, at: int) -> RadarTracks:
+        """The same where plots with a radar track's number, from an instant on, are another target's."""
+        return replace(self, closed={**self.closed, key: at})
 
     def pruned(self, before: int) -> RadarTracks:
-        """The same without plots older than an instant; tracks without plots are forgotten."""
-        if all(plots[0].at >= before for plots in self.plots.values()):
+        """The same without plots older than an instant; tracks without plots are forgotten, and soon their numbers too."""
+        if not self.silent and all(plots[0].at >= before for plots in self.plots.values()):
             return self
-        kept = {key: tuple(plot for plot in plots if plot.at >= before) for key, plots in self.plots.items()}
-        alive = {key: plots for key, plots in kept.items() if plots}
-        return replace(self, plots=alive, places={key: self.places[key] for key in alive})
+        alive = {
+            key: plots if plots[0].at >= before else tuple(plot for plot in plots if plot.at >= before)
+            for key, plots in self.plots.items()
+            if plots[-1].at >= before
+        }
+        heard = {key[:2] for key in alive}
+        silent = {number: at for number, at in self.silent.items() if number not in heard}
+        silent |= {key[:2]: plots[-1].at for key, plots in self.plots.items() if key[:2] not in heard}
+        longest = before - int(GREATEST_SILENCE_S * SECOND)
+        forgotten = {number for number, at in silent.items() if at < longest}
+        return RadarTracks(
+            alive,
+            {key: self.places[key] for key in alive},
+            {number: episode for number, episode in self.episode.items() if number not in forgotten},
+            {key: at for key, at in self.closed.items() if key in alive},
+            {number: at for number, at in silent.items() if number not in forgotten},
+            max((self.first_episode, *(self.episode[number] + 1 for number in forgotten))),
+        )
 
 
 def table(tracks: RadarTracks, untracked: int) -> Tracked:

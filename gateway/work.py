@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from gateway import align, associate, fuse, predict, track
 from gateway.align import SECOND, Fix, Geoid, Plot
-from gateway.associate import Association, Change, Setting
+from gateway.associate import Association, Change, Setting, Spans
 from gateway.frames import RadarFrame
-from gateway.fuse import Ended, Lanes, LifeChange, Scene, Settled
+from gateway.fuse import Adopted, Ended, Lanes, LifeChange, Scene, Settled
 from gateway.fuse.filtering import Job
 from gateway.fuse.rows import Row
 from gateway.fuse.weighting import Model
@@ -50,6 +50,7 @@ class Work:
         self.forecasts: list[predict.Forecast] = []
         self.events: list[Event] = []
         self.jobs: dict[int, Job] = {}
+        self._both: tuple[Spans, tuple[Adopted, ...], Spans] = (Spans(), (), Spans())
         self.untracked = 0
         self._placed = self._place(heard)
 
@@ -83,8 +84,7 @@ class Work:
         self.events += [Event(at, "info", text) for one in lived if (text := fuse.sentence(one, lanes)) is not None]
         alive = [lane for lane in lanes.lanes.values() if lane.ended_at is None and lane.events]
         silent = [lane for lane in alive if lane.coasting_at(at, self.options)]
-        spans = self.association.ledger.spans
-        self.rows += fuse.coast(silent, at, spans, self.geoid.separation_m, self.model)
+        self.rows += fuse.coast(silent, at, self._spans, self.geoid.separation_m, self.model)
         if alive and at % int(self.options.prediction_period_s * SECOND) == 0:
             self.forecasts.append(predict.forecast(alive, at, self.options.horizons_s, self.model))
         before = at - self.history
@@ -98,6 +98,10 @@ class Work:
                     Event(at, "info", f"radar track {track.name_of(key)}, {aircraft}, has fallen silent")
                 )
         self.association = associate.pruned(associate.forgotten(self.association, gone), before)
+        self.lanes, doubted = fuse.reviewed(self.lanes, self.association.ledger.pairs, self.tracks, at)
+        for one in doubted:
+            text = f"radar track {track.name_of(one.key)} is {one.aircraft} no more: its reports do not find it there"
+            self.events.append(Event(at, "info", text))
         if self.reported:
             self.reported = frozenset(change for change in self.reported if change.at >= before - 60 * SECOND)
 
@@ -254,7 +258,7 @@ class Work:
 
     def _move(self, after: Association) -> None:
         """A new state of association: the plots of pairs made, lost or moved in time change their system tracks."""
-        old = self.association
+        old, known = self.association, self._spans
         if after is old:
             return
         if after.ledger.spans != old.ledger.spans:
@@ -262,7 +266,7 @@ class Work:
         self.association = after
         if after.ledger.spans == old.ledger.spans:
             return
-        self.lanes, jobs = fuse.reroute(self.lanes, old.ledger.spans, self._scene())
+        self.lanes, jobs = fuse.reroute(self.lanes, known, self._scene())
         self.jobs = {job.track: job for job in jobs}
         self._settle()
         for change in (change for check in after.checks for change in check.changes if change not in self.reported):
@@ -270,7 +274,7 @@ class Work:
             self.changes.append(change)
             verb = "is" if change.kind == "associated" else "is no longer"
             self.events.append(Event(change.at, "info", f"{change.aircraft} {verb} radar track {change.radar_track}"))
-        self.lanes, ended = fuse.joined(self.lanes, after.ledger.spans)
+        self.lanes, ended = fuse.joined(self.lanes, self._spans)
         self.ended += ended
 
     # register -----------------------------------------------------------------------------------------------------
@@ -288,9 +292,31 @@ class Work:
             self._work_in(*fuse.take_fix(self.lanes, fix, scene))
         for plot, key in tracked:
             lane = fuse.lane_of(self.lanes, plot, key, scene)
+            if lane is None and self._goes_on(key):
+                scene = self._scene()
+                lane = fuse.lane_of(self.lanes, plot, key, scene)
             self._settle(lane)
             if not fuse.contains(self.lanes, lane, plot):  # a pair that changed just now may have taken it along
                 self._work_in(*fuse.take_plot(self.lanes, plot, key, scene))
+
+    def _goes_on(self, key: Key) -> bool:
+        """Whether a new radar track goes on where another one fell silent; from now on it is that one's track."""
+        self._settle()
+        known, scene = self._spans, self._scene()
+        found = fuse.continued(self.lanes, key, scene, self.model)
+        if found is None:
+            return False
+        self.lanes, job = fuse.taken_on(self.lanes, found, scene)
+        jobs = [job] if job is not None else []
+        if found.lane.aircraft is not None:
+            self.lanes, jobs = fuse.reroute(self.lanes, known, self._scene())
+        self.jobs = {job.track: job for job in jobs}
+        self._settle()
+        if found.former is not None:
+            self.tracks = self.tracks.closing(found.former, found.since)
+        self.lived.append(LifeChange(found.since, found.lane.track, "confirmed", found.reason()))
+        self.events.append(Event(found.since, "info", f"track {found.lane.track} goes on as {found.reason()}"))
+        return True
 
     def _work_in(self, lanes: Lanes, job: Job | None) -> None:
         """A job, to be worked together with those of other tracks."""
@@ -303,14 +329,24 @@ class Work:
         if not self.jobs or (lane != -1 and lane not in self.jobs):
             return
         jobs, self.jobs = list(self.jobs.values()), {}
-        spans, separation_m = self.association.ledger.spans, self.geoid.separation_m
-        self.lanes, rows, outliers = fuse.work(self.lanes, jobs, spans, separation_m, self.model)
+        separation_m = self.geoid.separation_m
+        self.lanes, rows, outliers = fuse.work(self.lanes, jobs, self._spans, separation_m, self.model)
         self.rows += rows
         if outliers:
             self.count("outliers, their pull bounded", outliers)
 
     def _scene(self) -> Scene:
-        return Scene(self.tracks, self.association.ledger.spans, self.options)
+        return Scene(self.tracks, self._spans, self.options)
+
+    @property
+    def _spans(self) -> Spans:
+        """Which radar track is which aircraft when: as associated, and where a new number goes on with an old one."""
+        found, adopted = self.association.ledger.spans, self.lanes.adopted
+        if not adopted:
+            return found
+        if found is not self._both[0] or adopted is not self._both[1]:
+            self._both = found, adopted, fuse.spans_with(found, adopted)
+        return self._both[2]
 
     def _see_radars(self) -> None:
         self.radar_frames = {number: RadarFrame.of(radar, self.frame) for number, radar in self.radars.items()}

@@ -1,17 +1,20 @@
 """Fuse: one state for each aircraft from everything that saw it (paper 003, 2.4).
 
-`lanes` holds the system tracks and their recent past; `life` begins, confirms and ends them (`agreement` is its test);
-`placing` puts measurements into them, late ones where they belong; `filtering` runs the filter over many tracks at once;
-`weighting` holds the four ways to weigh a position source against a radar; `rows` makes the result.
+`lanes` holds the system tracks and their recent past; `life` begins, confirms and ends them (`agreement` is its test), and
+`continuing` finds them again when a radar numbers them anew; `placing` puts measurements into them, late ones where they
+belong; `filtering` runs the filter over many tracks at once; `weighting` holds the four ways to weigh a position source
+against a radar; `rows` makes the result.
 """
 
-from gateway.fuse.lanes import Ended, Lane, Lanes, contains, emptied, joined
+from gateway.fuse.continuing import continued, reviewed, spans_with, taken_on
+from gateway.fuse.lanes import Adopted, Ended, Lane, Lanes, contains, emptied, joined
 from gateway.fuse.life import LifeChange, end_silent, sentence, told
 from gateway.fuse.placing import Scene, lane_of, reroute, take_fix, take_plot
 from gateway.fuse.rows import Fused, Row, coast, knows_height, table, work
 from gateway.fuse.settled import Settled, remaining, settled
 
 __all__ = [
+    "Adopted",
     "Ended",
     "Fused",
     "Lane",
@@ -22,6 +25,7 @@ __all__ = [
     "Settled",
     "coast",
     "contains",
+    "continued",
     "emptied",
     "end_silent",
     "joined",
@@ -29,11 +33,14 @@ __all__ = [
     "lane_of",
     "remaining",
     "reroute",
+    "reviewed",
     "sentence",
     "settled",
+    "spans_with",
     "table",
     "take_fix",
     "take_plot",
+    "taken_on",
     "told",
     "work",
 ]

@@ -76,6 +76,19 @@ class Gone:
 
 
 @dataclass(frozen=True, slots=True)
+class Adopted:
+    """A radar track that is an aircraft since an instant, because it goes on where that one's fell silent."""
+
+    key: Key
+    aircraft: str
+    since: int
+    former: Key | None
+    until: int | None = None
+    gps_at: int = 0  # the aircraft's last report that was counted
+    reports: int = 0  # how many have come since
+
+
+@dataclass(frozen=True, slots=True)
 class Lanes:
     """All system tracks; track numbers count from 1, and none is ever given to something else."""
 
@@ -84,6 +97,7 @@ class Lanes:
     by_key: Mapping[tuple[Key, int], int] = field(default_factory=dict)
     next_track: int = 1
     gone: Mapping[str, Gone] = field(default_factory=dict)  # of aircraft whose track ended, the latest last
+    adopted: tuple[Adopted, ...] = ()
 
     def with_lane(self, lane: Lane) -> Lanes:
         """The same with one lane put in place of its former self."""
@@ -91,7 +105,7 @@ class Lanes:
 
     def with_lanes(self, lanes: Mapping[int, Lane]) -> Lanes:
         """The same with some lanes put in place of their former selves."""
-        return Lanes({**self.lanes, **lanes}, self.by_aircraft, self.by_key, self.next_track, self.gone)
+        return Lanes({**self.lanes, **lanes}, self.by_aircraft, self.by_key, self.next_track, self.gone, self.adopted)
 
     def begun(self, aircraft: str | None, key: Key | None, ordinal: int, origin: str) -> tuple[Lanes, Lane]:
         """The same with a new lane of the next number."""
@@ -106,17 +120,17 @@ class Lanes:
             gone = {aircraft: one for aircraft, one in gone.items() if aircraft != lane.aircraft} if gone else gone
         if lane.key is not None:
             by_key = {**by_key, (lane.key, lane.ordinal): lane.track}
-        return Lanes({**self.lanes, lane.track: lane}, by_aircraft, by_key, self.next_track, gone)
+        lanes = {**self.lanes, lane.track: lane}
+        return Lanes(lanes, by_aircraft, by_key, self.next_track, gone, self.adopted)
 
     def without(self, tracks: Iterable[int]) -> Lanes:
         """The same without some tracks."""
         gone = set(tracks)
-        return Lanes(
-            {track: lane for track, lane in self.lanes.items() if track not in gone},
-            {aircraft: track for aircraft, track in self.by_aircraft.items() if track not in gone},
-            {key: track for key, track in self.by_key.items() if track not in gone},
-            self.next_track,
-            self.gone,
+        return replace(
+            self,
+            lanes={track: lane for track, lane in self.lanes.items() if track not in gone},
+            by_aircraft={aircraft: track for aircraft, track in self.by_aircraft.items() if track not in gone},
+            by_key={key: track for key, track in self.by_key.items() if track not in gone},
         )
 
     def pruned(self, before: int) -> Lanes:
@@ -167,7 +181,7 @@ def emptied(lanes: Lanes, at: int) -> tuple[Lanes, list[Ended]]:
         for track, lane in lanes.lanes.items()
         if lane.key is not None and lane.ended_at is None
     ]
-    return replace(lanes, lanes=kept, by_key={}, gone={}), ended
+    return replace(lanes, lanes=kept, by_key={}, gone={}, adopted=()), ended
 
 
 def joined_at(lane: Lane, spans: Spans) -> tuple[int, str] | None:

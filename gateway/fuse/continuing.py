@@ -1,0 +1,169 @@
+"""A radar track with a new number that goes on where another one fell silent: the same track, if that is beyond doubt.
+
+Radars lose a target and number it anew. When a new radar track has the plots to begin with, every confirmed track whose
+own radar track is silent is carried on to them; the sum of squared distances (Mahalanobis) of these plots must be within
+the chi-square gate. It must also be plain: no other silent track explains the plots nearly as well, and no other new radar
+track is within the same gate. Then an aircraft's new radar track is the aircraft's at once (`Adopted`, until association
+has found the same, or GPS speaks against it), and a track that only a radar knows keeps its number. Else a new one begins.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from gateway.align import SECOND, Plot
+from gateway.associate import Span, Spans, aircraft_of, ordinal_of
+from gateway.estimators.kalman import Estimate
+from gateway.fuse.agreement import CONFIRMED, expected
+from gateway.fuse.events import NEVER, Event, Job, rank
+from gateway.fuse.lanes import Adopted, Lane, Lanes
+from gateway.fuse.placing import Scene, begin
+from gateway.fuse.weighting import Model
+from gateway.track import Key, RadarTracks, name_of
+
+GATE_SIGMAS = 3.09  # one sided: of right ones, one in a thousand is refused
+PLAIN_ODDS = 100.0  # of the best explanation against each other one
+PLOTS = 5  # of a new radar track that are compared, at most
+DOUBTFUL_REPORTS = 15  # so many, and association has not found the same: then they speak against it
+
+
+@dataclass(frozen=True, slots=True)
+class Continuation:
+    """A track that goes on with another radar track, since when, and what its radar track was."""
+
+    lane: Lane
+    key: Key
+    since: int
+    former: Key | None
+
+    def reason(self) -> str:
+        """For people: "radar track 1/7, which was 1/3"."""
+        new, old = name_of(self.key), name_of(self.former) if self.former else ""
+        return f"radar track {new}" + (" again" if new == old else f", which was {old}" if old else " goes on with it")
+
+
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """How plots lie to a track that is carried on to them."""
+
+    within: bool
+    log_likelihood: float
+
+
+def continued(lanes: Lanes, key: Key, scene: Scene, model: Model) -> Continuation | None:
+    """The track that a radar track without one continues, or None while it has too few plots or nothing is plain."""
+    plots = scene.tracks.plots.get(key, ())
+    if not begin(plots) or aircraft_of(scene.spans, key, plots[-1].at) is not None:
+        return None
+    fits = [(lane, former, _fit(lane, plots, model)) for lane, former in _silent(lanes, plots[0].at, scene)]
+    near = [(fit.log_likelihood, lane, former) for lane, former, fit in fits if fit is not None and fit.within]
+    if not near:
+        return None
+    best, lane, former = max(near, key=lambda one: (one[0], -one[1].track))
+    others = [fit.log_likelihood for other, _, fit in fits if fit is not None and other is not lane]
+    if any(other > best - math.log(PLAIN_ODDS) for other in others) or _has_rival(lane, key, scene, model):
+        return None
+    return Continuation(lane, key, plots[0].at, former)
+
+
+def _silent(lanes: Lanes, at: int, scene: Scene) -> Iterator[tuple[Lane, Key | None]]:
+    """Confirmed tracks that a radar saw lately, but none of their radar tracks since an instant; with the last of these."""
+    longest = int(scene.options.end_after_s * SECOND)
+    for lane in lanes.lanes.values():
+        if not lane.events or lane.ended_at is not None or lane.last.score != CONFIRMED:
+            continue
+        if lane.last.radar_at == NEVER or at - lane.last.radar_at > longest:
+            continue
+        mine = scene.spans.by_aircraft.get(lane.aircraft or "", ())
+        keys = [lane.key] if lane.key is not None else [span.key for span in mine if span.until is None]
+        last = {key: scene.tracks.plots[key][-1].at for key in keys if key in scene.tracks.plots}
+        if all(seen < at for seen in last.values()):
+            yield lane, max(last, key=lambda key: last[key]) if last else lane.key
+
+
+def _fit(lane: Lane, plots: Sequence[Plot], model: Model) -> _Fit | None:
+    """A track carried on to the first plots of a radar track; None where it has no state from before them."""
+    base = next((event for event in reversed(lane.events) if event.at <= plots[0].at), None)
+    if base is None:
+        return None
+    return _compared(base, plots[:PLOTS], model)
+
+
+def _compared(base: Event, plots: Sequence[Plot], model: Model) -> _Fit:
+    state, at = Estimate(base.mean[None], base.covariance[None]), base.at
+    distance, degrees, log_likelihood = 0.0, 0, 0.0
+    for plot in plots:
+        state, told = expected(state, (plot.at - at) / SECOND, plot, model)
+        at = plot.at
+        distance += float(told.normalised[0])
+        degrees += int(told.measured.sum())
+        log_likelihood += float(told.log_likelihood[0])
+    return _Fit(distance <= chi_square_gate(degrees), log_likelihood)
+
+
+def chi_square_gate(degrees: int) -> float:
+    """What chi-square with so many degrees exceeds once in a thousand times (Wilson and Hilferty; to 1 % from 2 on)."""
+    share = 2.0 / (9.0 * max(degrees, 1))
+    return degrees * (1.0 - share + GATE_SIGMAS * math.sqrt(share)) ** 3
+
+
+def _has_rival(lane: Lane, key: Key, scene: Scene, model: Model) -> bool:
+    """Whether another radar track of the same radar, begun since this track fell silent, may be it as well."""
+    for other, plots in scene.tracks.plots.items():
+        if other == key or other == lane.key or other[0] != key[0] or plots[0].at <= lane.last.radar_at:
+            continue
+        fit = _fit(lane, plots[:PLOTS], model)
+        if fit is not None and fit.within:
+            return True
+    return False
+
+
+def spans_with(spans: Spans, adopted: Sequence[Adopted]) -> Spans:
+    """Which radar track is which aircraft when: what association found, and what was adopted until it did."""
+    mine = {one.key: one for one in adopted}
+    since = {one.former: one.since for one in adopted if one.former is not None}
+    found = []
+    for span in spans:
+        if span.key in mine:
+            span = replace(span, index=span.index + 1)
+        elif span.key in since and (span.until is None or span.until > since[span.key]):
+            span = replace(span, until=max(since[span.key], span.since))
+        found.append(span)
+    for one in adopted:
+        ends = [at for at in (one.until, *(span.since for span in spans.by_key.get(one.key, ()))) if at is not None]
+        found.append(Span(one.key, one.aircraft, one.since, min(ends, default=None)))
+    return Spans(sorted((s for s in found if s.until is None or s.until > s.since), key=lambda span: span.since))
+
+
+def reviewed(lanes: Lanes, pairs: Mapping[Key, str], tracks: RadarTracks, at: int) -> tuple[Lanes, list[Adopted]]:
+    """The lanes without what was adopted and is gone; and what the aircraft's reports speak against, which ends now."""
+    kept, doubted = [], []
+    for one in lanes.adopted:
+        if one.key not in tracks.plots:
+            continue
+        lane = lanes.lanes.get(lanes.by_aircraft.get(one.aircraft, 0))
+        gps_at = lane.last.gps_at if lane is not None and lane.events else one.gps_at
+        if one.until is None and one.key not in pairs and gps_at > one.gps_at:
+            one = replace(one, gps_at=gps_at, reports=one.reports + 1)
+            if one.reports >= DOUBTFUL_REPORTS:
+                one = replace(one, until=at)
+                doubted.append(one)
+        kept.append(one)
+    return (replace(lanes, adopted=tuple(kept)) if kept or lanes.adopted else lanes), doubted
+
+
+def taken_on(lanes: Lanes, found: Continuation, scene: Scene) -> tuple[Lanes, Job | None]:
+    """The lanes with a radar track going on as another one's: an aircraft's is adopted; what else is there goes on as it is.
+
+    The job is that of the new plots, where it is no aircraft; an aircraft's track is to be worked again from `since` on.
+    """
+    lane = found.lane
+    if lane.aircraft is not None:
+        one = Adopted(found.key, lane.aircraft, found.since, found.former, gps_at=max(found.since, lane.last.gps_at))
+        return replace(lanes, adopted=(*lanes.adopted, one)), None
+    # Its past cannot be made again from the new radar track's plots, so none of it may be given up.
+    lane = replace(lane, key=found.key, ordinal=ordinal_of(scene.spans, found.key, found.since), whole=False)
+    plots = sorted(scene.tracks.plots[found.key], key=rank)
+    return lanes.added(lane), Job(lane.track, lane.last, plots, scene.neighbour(lane))
