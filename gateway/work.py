@@ -330,10 +330,15 @@ class Work:
             return
         jobs, self.jobs = list(self.jobs.values()), {}
         separation_m = self.geoid.separation_m
-        self.lanes, rows, outliers = fuse.work(self.lanes, jobs, self._spans, separation_m, self.model)
+        self.lanes, rows, fresh = fuse.work(self.lanes, jobs, self._spans, separation_m, self.model)
         self.rows += rows
+        outliers = sum(event.outlying for _, event in fresh)
         if outliers:
             self.count("outliers, their pull bounded", outliers)
+        for number, event in fresh:
+            if event.restarted is not None:
+                self.count("restarted after divergence")
+                self.events.append(Event(event.at, "warning", f"track {number} started again: {event.restarted}"))
 
     def _scene(self) -> Scene:
         return Scene(self.tracks, self._spans, self.options)

@@ -40,6 +40,7 @@ WINDOW = 10  # residuals that p is the mean of
 LEAST_GAMMA, GREATEST_GAMMA = 1e-6, 3.5
 GREATEST_DENSITY = 1e6  # m2/s5
 GREATEST_LESSON = 9.0  # squared residual, normalised: what an outlier teaches of the calm target is bounded
+ELSEWHERE = 2.0  # times `robust`: a residual further out is no manoeuvre, but another place, and teaches nothing
 SHORTEST_S = 1e-3  # that a fixed q is taken over
 SPED_S = 10.0  # how long a measured velocity makes steady gains, which know of none, too high
 UNKNOWN_SPEED_MPS, UNKNOWN_ACCELERATION_MPS2 = 100.0, 5.0  # sigmas of what is not measured at the start
@@ -214,6 +215,8 @@ def update(
         sped, faster = told.measured[:, axes:], told.innovation[:, axes:]
         surprise = np.where(sped, faster * faster / told.variance[:, axes:], surprise)  # it shows a manoeuvre sooner
         touched, learnt, sped_s = measured | sped, learnt | sped, np.where(sped, 0.0, sped_s)
+    if tuning.robust is not None:
+        learnt = learnt & (surprise <= (ELSEWHERE * tuning.robust) ** 2)
     surprises, p, density = _lessons(state, density, surprise, learnt, tuning)
     since = np.zeros_like(y)
     if not touched.all():

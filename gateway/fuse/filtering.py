@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from gateway.align import SECOND, Fix, Plot
 from gateway.estimators.kalman import Estimate
 from gateway.fuse.agreement import score_after
+from gateway.fuse.diverging import can_begin, far_row, is_lost, is_sound, row_of, why
 from gateway.fuse.estimating import Estimator, Group, InteractingModels, SingleModel, stacked
 from gateway.fuse.events import NEVER, Belief, Event, Job, Measure, Near, Neighbour, rank
 from gateway.fuse.light import LightFilter
@@ -80,10 +82,33 @@ def _advance(
         elapsed_s = np.array([(measure.at - base.at) / SECOND for base, measure in zip(before, chosen, strict=True)])
         memory = stacked([base.memory for base in before])
         after = estimator.advance(before, Group(kind, radar, chosen, seen, elapsed_s, memory))
+        all_sound = is_sound(after.state)
         for i, row in enumerate(rows):
+            far = far_row(before[i], chosen[i]) if after.far[i] else (0, NEVER)
             kept = after.memory[i], before[i], bool(after.outlying[i]), after.beliefs[i]
-            events[row] = _event(chosen[i], after.state, i, *kept, score_after(before[i], chosen[i], model))
+            score = score_after(before[i], chosen[i], model)
+            event = _event(chosen[i], after.state, i, *kept, score, *far)
+            lost = is_lost(event) or not (all_sound or is_sound(row_of(after.state, i)))
+            events[row] = _begun_again(event, estimator) if lost and can_begin(chosen[i]) else event
     return [events[row] for row in range(len(measures))]
+
+
+def _begun_again(event: Event, estimator: Estimator) -> Event:
+    """The same track, from its newest measurement alone."""
+    first, belief = estimator.begin(event.measure)
+    was = Estimate(event.mean[None], event.covariance[None])
+    has_height = event.height_at == event.at
+    return replace(
+        event,
+        mean=first.mean[0],
+        covariance=first.covariance[0],
+        memory=np.full_like(event.memory, np.nan),
+        belief=belief,
+        height_at=event.at if has_height else NEVER,
+        far_off=0,
+        far_since=NEVER,
+        restarted=why(was, first, event.far_off),
+    )
 
 
 def _group(measure: Measure, near: Near | None) -> tuple[str, int]:
@@ -104,6 +129,8 @@ def _event(
     outlying: bool,
     belief: Belief,
     score: float = 0.0,
+    far_off: int = 0,
+    far_since: int = NEVER,
 ) -> Event:
     gps_at, radar_at, height_at = (base.gps_at, base.radar_at, base.height_at) if base else (NEVER, NEVER, NEVER)
     barometric, callsign = (base.barometric, base.callsign) if base else (None, None)
@@ -132,5 +159,7 @@ def _event(
         barometric,
         callsign,
         belief,
+        far_off,
+        far_since,
         score=score,
     )

@@ -104,17 +104,17 @@ def row_of(lane: Lane, event: Event, spans: Spans, separation_m: float, model: M
 
 def work(
     lanes: Lanes, jobs: Sequence[Job], spans: Spans, separation_m: float, model: Model
-) -> tuple[Lanes, list[Row], int]:
-    """The lanes with some jobs done, the rows that they wrote, and how many new measurements lay outside."""
+) -> tuple[Lanes, list[Row], list[tuple[int, Event]]]:
+    """The lanes with some jobs done, the rows that they wrote, and each new measurement's event with its track."""
     rows: list[Row] = []
     changed: dict[int, Lane] = {}
-    outliers = 0
+    fresh: list[tuple[int, Event]] = []
     for job, events in zip(jobs, run(jobs, model), strict=True):
         lane = lanes.lanes[job.track]
         changed[lane.track] = lane.with_events((*lane.events, *events))
         rows += [row_of(lane, event, spans, separation_m, model) for event in events]
-        outliers += sum(event.outlying and event.measure.serial == job.fresh for event in events)
-    return lanes.with_lanes(changed), rows, outliers
+        fresh += [(job.track, event) for event in events if event.measure.serial == job.fresh]
+    return lanes.with_lanes(changed), rows, fresh
 
 
 def coast(lanes: Sequence[Lane], at: int, spans: Spans, separation_m: float, model: Model) -> list[Row]:
