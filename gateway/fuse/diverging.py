@@ -12,34 +12,25 @@ import math
 import numpy as np
 
 from gateway.align import SECOND, Fix
-from gateway.estimators.kalman import POSITION, Estimate
+from gateway.estimators.kalman import Estimate
 from gateway.fuse.events import Event, Measure
 
 IN_A_ROW = 5  # far measurements that no good one came between
-FEW, LONG_S = 3, 8.0  # or so many over so long: with seconds between them a filter catches up by chance, at any speed
+FEW, LONG_S = 3, 10.0  # or so many over so long: with seconds between them a filter catches up by chance, at any speed
+# What a hard manoeuvre does to a filter that is sure of itself is not a loss: 1 g for as long as nothing fits, and 30 m.
+MANOEUVRE_MPS2, NEAR_M = 10.0, 30.0
 
 _MOVING = np.arange(6)
 
 
-def far_row(base: Event, measure: Measure) -> tuple[int, int]:
-    """How many far measurements in a row there are with this one, and since when."""
-    return base.far_off + 1, base.far_since if base.far_off else measure.at
+def far_row(base: Event) -> tuple[int, int]:
+    """How many far measurements in a row there are with this one of a track, and when the last good one was valid."""
+    return base.far_off + 1, base.far_since if base.far_off else base.at
 
 
-def is_lost(event: Event) -> bool:
-    """Whether too many measurements in a row were far away."""
+def may_be_lost(event: Event) -> bool:
+    """Whether so many measurements in a row were far away that their distance decides."""
     return event.far_off >= IN_A_ROW or (event.far_off >= FEW and event.at - event.far_since >= LONG_S * SECOND)
-
-
-def is_sound(after: Estimate) -> bool:
-    """Whether all of some states are numbers, and all variances of positions and velocities positive."""
-    variance = after.covariance[:, _MOVING, _MOVING]
-    return bool((variance > 0.0).all()) and math.isfinite(float(after.mean.sum()) + float(after.covariance.sum()))
-
-
-def row_of(states: Estimate, row: int) -> Estimate:
-    """One of some states."""
-    return Estimate(states.mean[row : row + 1], states.covariance[row : row + 1])
 
 
 def can_begin(measure: Measure) -> bool:
@@ -47,10 +38,20 @@ def can_begin(measure: Measure) -> bool:
     return isinstance(measure, Fix) or not any(map(math.isnan, measure.polar))
 
 
-def why(was: Estimate, now: Estimate, far_off: int) -> str:
-    """What is told of a filter that begins anew: states (1, 9) with the measurement worked in, and begun from it alone."""
-    if not is_sound(was):
+def why(event: Event, first: Estimate) -> str | None:
+    """Why a filter begins anew with a measurement: states with it worked in, and begun from it alone (1, 9); None = not."""
+    if not is_sound(Estimate(event.mean[None], event.covariance[None])):
         return "its covariance was no longer positive"
-    off_m = float(np.linalg.norm(now.mean[0, POSITION] - was.mean[0, POSITION]))
+    axes = 2 if isinstance(event.measure, Fix) and not event.measure.has_height else 3
+    off_m = float(np.linalg.norm(first.mean[0, :axes] - event.mean[:axes]))
+    since_s = (event.at - event.far_since) / SECOND
+    if off_m <= NEAR_M + 0.5 * MANOEUVRE_MPS2 * since_s * since_s:
+        return None
     away = f"{off_m:.0f} m" if off_m < 1000.0 else f"{off_m / 1000.0:.1f} km"
-    return f"its last {far_off} measurements were all far from where it was expected, the newest by {away}"
+    return f"its last {event.far_off} measurements were all far from where it was expected, the newest by {away}"
+
+
+def is_sound(after: Estimate) -> bool:
+    """Whether some states (n, 9) are numbers, and all variances of their positions and velocities positive."""
+    variance = after.covariance[:, _MOVING, _MOVING]
+    return bool((variance > 0.0).all()) and math.isfinite(float(after.mean.sum()) + float(after.covariance.sum()))

@@ -37,7 +37,7 @@ class Event:
     callsign: str | None
     belief: Belief  # only the estimator that made it reads it
     far_off: int = 0  # measurements in a row, this one included, that were far from where the track was expected
-    far_since: int = NEVER  # when the first of them was valid
+    far_since: int = NEVER  # when the last one before them was valid
     restarted: str | None = None  # why the filter began anew with this measurement; None = it went on
     score: float = 0.0  # how much speaks for one thing that flies (agreement.py); infinite = confirmed
 

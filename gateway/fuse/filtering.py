@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gateway.align import SECOND, Fix, Plot
 from gateway.estimators.kalman import Estimate
 from gateway.fuse.agreement import score_after
-from gateway.fuse.diverging import can_begin, far_row, is_lost, is_sound, row_of, why
+from gateway.fuse.diverging import can_begin, far_row, is_sound, may_be_lost, why
 from gateway.fuse.estimating import Estimator, Group, InteractingModels, SingleModel, stacked
 from gateway.fuse.events import NEVER, Belief, Event, Job, Measure, Near, Neighbour, rank
 from gateway.fuse.light import LightFilter
@@ -84,19 +84,22 @@ def _advance(
         after = estimator.advance(before, Group(kind, radar, chosen, seen, elapsed_s, memory))
         all_sound = is_sound(after.state)
         for i, row in enumerate(rows):
-            far = far_row(before[i], chosen[i]) if after.far[i] else (0, NEVER)
+            far = far_row(before[i]) if after.far[i] else (0, NEVER)
             kept = after.memory[i], before[i], bool(after.outlying[i]), after.beliefs[i]
             score = score_after(before[i], chosen[i], model)
             event = _event(chosen[i], after.state, i, *kept, score, *far)
-            lost = is_lost(event) or not (all_sound or is_sound(row_of(after.state, i)))
-            events[row] = _begun_again(event, estimator) if lost and can_begin(chosen[i]) else event
+            events[row] = event if all_sound and not may_be_lost(event) else _begun_again(event, estimator)
     return [events[row] for row in range(len(measures))]
 
 
 def _begun_again(event: Event, estimator: Estimator) -> Event:
-    """The same track, from its newest measurement alone."""
+    """The same track from its newest measurement alone, if it is lost and that gives a place."""
+    if not can_begin(event.measure):
+        return event
     first, belief = estimator.begin(event.measure)
-    was = Estimate(event.mean[None], event.covariance[None])
+    reason = why(event, first)
+    if reason is None:
+        return event
     has_height = event.height_at == event.at
     return replace(
         event,
@@ -107,7 +110,7 @@ def _begun_again(event: Event, estimator: Estimator) -> Event:
         height_at=event.at if has_height else NEVER,
         far_off=0,
         far_since=NEVER,
-        restarted=why(was, first, event.far_off),
+        restarted=reason,
     )
 
 
