@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-STUDIES = ("fusion", "alpha-beta-gamma", "rmimm")  # the modules of this package that have a `run`, `-` for `_`
+STUDIES = (
+    "fusion",
+    "alpha-beta-gamma",
+    "rmimm",
+    "registration",
+)  # the modules of this package that have a `run`, `-` for `_`
 
 Progress = Callable[[str, float], None]  # what is being done, and the share of the whole that is done
 
