@@ -16,7 +16,7 @@ from gateway.cli.viewing import Viewing
 if TYPE_CHECKING:
     from gateway.picture import Picture
     from gateway.runtime.run import Run
-    from gateway.runtime.summary import Summary
+    from gateway.runtime.summary import SmoothedSummary, Summary
 
 _REFRESH_S = 0.2
 _WAITING_SAID_AFTER_S = 3.0  # by then most streams have told where they are
@@ -77,6 +77,13 @@ class Display:
             completed = self._fraction() if self._fraction else None
             self._progress.update(self._task, description=_line(run, picture), completed=completed)
 
+    def smoothing(self, share: float) -> None:
+        """Show how far the smoothing at the end is."""
+        now = time.monotonic()
+        if self._task is not None and (now >= self._due or share >= 1.0):
+            self._due = now + _REFRESH_S
+            self._progress.update(self._task, description="smoothing", total=1.0, completed=share)
+
     def show(self, summary: Summary) -> None:
         """The summary: a table for people, or one JSON object for programs."""
         if self._as_json:
@@ -107,8 +114,22 @@ def show_summary(summary: Summary, console: Console) -> None:
             numbers = (f"{score.rmse_m:.2f}", f"{score.median_m:.2f}", f"{score.p95_m:.2f}", str(score.count))
             scores.add_row(_WORDS.get(kind, kind), *numbers)
         console.print(scores)
+    if summary.smoothed is not None and summary.smoothed.accuracy:
+        _show_smoothed(summary.smoothed, console)
     if summary.archive is not None:
         console.print(f"archived in {summary.archive}", soft_wrap=True)
+
+
+def _show_smoothed(found: SmoothedSummary, console: Console) -> None:
+    """The tracks' last word and what smoothing made of it, row by row the same times."""
+    table = Table(box=None, padding=(0, 2, 0, 0), title="distance to the truth, RMSE m", title_justify="left")
+    for column in ("", "filtered", "smoothed", "ratio", "number"):
+        table.add_column(column, justify="left" if not column else "right")
+    for kind, score in found.accuracy.items():
+        before, after = score.filtered.rmse_m, score.smoothed.rmse_m
+        ratio = f"{after / before:.2f}" if before > 0.0 else ""
+        table.add_row(_WORDS.get(kind, kind), f"{before:.2f}", f"{after:.2f}", ratio, str(score.smoothed.count))
+    console.print(table)
 
 
 _WORDS = {
@@ -118,6 +139,7 @@ _WORDS = {
     "gps only": "track, GPS only",
     "radar only": "track, radar only",
     "coasting": "track, coasting",
+    "all": "track, all of it",
 }
 
 
@@ -133,6 +155,8 @@ def _rows(summary: Summary) -> list[tuple[str, str]]:
         ("tracks", f"{summary.tracks} ({', '.join(summary.aircraft) or 'no aircraft'}), {summary.track_rows} updates"),
         ("associations", f"{summary.associations}, {summary.associations_lost} lost again"),
     ]
+    if summary.smoothed is not None:
+        rows.append(("smoothed", f"{summary.smoothed.rows} updates"))
     if summary.epoch_offset_s:
         rows.append(("epoch offset", f"{summary.epoch_offset_s} s: the sources' date is not ours"))
     rows += [("counted", f"{number} {reason}") for reason, number in summary.counters.items() if _is_news(reason)]

@@ -36,10 +36,14 @@ Examples:
 
   talkdown replay flight.tlog --estimator alpha-beta-gamma
 
+  talkdown replay flight.tlog radar.pcap --smooth --archive sessions
+
   talkdown replay three-planes.tlog --plan mavlink:2=circuit.plan
 
   talkdown replay sessions/20260301T120000Z-demo-field --viewer none --json
 """
+
+SMOOTHED = ("kalman", "imm", "rmimm")  # the estimators that a smoother can go back over
 
 FilesArgument = Annotated[
     list[Path],
@@ -99,6 +103,12 @@ WeightingOption = Annotated[
 AssociationOption = Annotated[
     take.Association | None,
     typer.Option("--association", help="When two are one. (default: the session's, else default)", show_default=False),
+]
+SmoothOption = Annotated[
+    bool,
+    typer.Option(
+        "--smooth", help="When it is over, make smoothed tracks: what later measurements tell of each instant."
+    ),
 ]
 
 
@@ -171,6 +181,7 @@ def replay(
     estimator: EstimatorOption = None,
     weighting: WeightingOption = None,
     association: AssociationOption = None,
+    smooth: SmoothOption = False,
     key: take.KeyOption = None,
     quiet: take.QuietOption = False,
     json: take.JsonOption = False,
@@ -194,6 +205,11 @@ def replay(
         found = place or playback.place or playback.find_place()
         has_own_place = place is not None or playback.place is not None
         options = take.change(playback.options, weighting, association, estimator)
+        if smooth and options.estimator not in SMOOTHED:
+            raise UsageError(
+                f"--smooth cannot go back over {options.estimator}, which keeps no covariances that hold together; "
+                f"choose --estimator {', '.join(SMOOTHED[:-1])} or {SMOOTHED[-1]}."
+            )
         playback, options = seek(playback, options, begin, end, mute)
         setup = Setup(
             place=found,
@@ -203,6 +219,7 @@ def replay(
             keys=take.read_keys(place, site),
             signing_key=signing_key,
             is_watched=pace is not None or looks is not take.Viewer.none,
+            smooth=smooth,
             name="" if has_own_place else files[0].stem,
             command=tuple(sys.argv[1:]),
         )
@@ -213,7 +230,19 @@ def replay(
         ):
             for note in playback.notes:
                 display.say(note)
-            summary = run_replay(playback, setup, speed=pace, watch=display.watch, asked_to_stop=stop)
+            if smooth and archive is None:
+                display.say(
+                    "The smoothed tracks are compared with the truth and drawn, where there is one; "
+                    "to keep them, name a folder with --archive."
+                )
+            summary = run_replay(
+                playback,
+                setup,
+                speed=pace,
+                watch=display.watch,
+                asked_to_stop=stop,
+                tell_smoothed=display.smoothing if smooth else lambda share: None,
+            )
         display.show(summary)
     except (FileError, FolderError, SeekError) as error:
         raise UsageError(str(error)) from error

@@ -164,13 +164,7 @@ def table(
     n = len(rows)
     mean = np.array([row.mean for row in rows]).reshape(n, SIZE)
     full = np.array([row.covariance for row in rows]).reshape(n, SIZE, SIZE)
-    position = np.ascontiguousarray(mean[:, POSITION])
-    latitude, longitude, height = frame.geodetic_from_enu(position)
-    local = frame.local_from_enu(latitude, longitude)
-    both = np.zeros((n, 6, 6))
-    both[:, :3, :3] = both[:, 3:, 3:] = local
-    covariance = both @ np.ascontiguousarray(full[:, :6, :6]) @ both.transpose(0, 2, 1)
-    velocity = (local @ mean[:, VELOCITY][:, :, None])[:, :, 0]
+    latitude, longitude, height, velocity, covariance = in_the_world(mean, full, frame)
     has_height = knows_height([row.event for row in rows], [row.time for row in rows], full)
     height = np.where(has_height, height, math.nan)
     velocity[~has_height & (covariance[:, 5, 5] > CLIMB_SIGMA_MPS**2), 2] = math.nan
@@ -191,7 +185,7 @@ def table(
         velocity_mps=velocity,
         covariance=covariance.reshape(n, 36),
         modes=np.array([row.modes for row in rows]).reshape(n, 3),
-        runway_m=turn(frame.runway_from_enu, position),
+        runway_m=turn(frame.runway_from_enu, np.ascontiguousarray(mean[:, POSITION])),
         bias_m=np.where(known & has_error, mean[:, ERROR], math.nan),
         pressure_altitude_m=np.array([_pressure_altitude_m(row) for row in rows]).reshape(n),
         callsign=tuple(row.event.callsign for row in rows),
@@ -199,3 +193,17 @@ def table(
         ended=tuple(ended),
         lived=tuple(lived),
     )
+
+
+def in_the_world(mean: Floats, covariance: Floats, frame: RunwayFrame) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """States (n, 9), (n, 9, 9) as latitude, longitude (rad) and height (m), (n,) each, and along the axes at each point.
+
+    These are the velocity (n, 3), and the covariance (n, 6, 6) of position and velocity.
+    """
+    latitude, longitude, height = frame.geodetic_from_enu(np.ascontiguousarray(mean[:, POSITION]))
+    local = frame.local_from_enu(latitude, longitude)
+    both = np.zeros((len(mean), 6, 6))
+    both[:, :3, :3] = both[:, 3:, 3:] = local
+    along = both @ np.ascontiguousarray(covariance[:, :6, :6]) @ both.transpose(0, 2, 1)
+    velocity = (local @ mean[:, VELOCITY][:, :, None])[:, :, 0]
+    return latitude, longitude, height, velocity, along

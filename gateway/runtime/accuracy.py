@@ -36,7 +36,15 @@ class Score:
     p95_m: float
 
 
-class _Truths:
+@dataclass(frozen=True, slots=True)
+class SmoothedScore:
+    """Distances to the truth of the same rows as the filter left them in the end, and smoothed."""
+
+    filtered: Score
+    smoothed: Score
+
+
+class Truths:
     """What is known of one aircraft's true path, not yet settled: times, positions in the runway frame."""
 
     __slots__ = ("height_m", "latitude_rad", "longitude_rad", "msl", "time")
@@ -49,6 +57,7 @@ class _Truths:
         self.msl: list[bool] = []
 
     def add(self, truth: Truth) -> None:
+        """Take one; without a height it tells nothing."""
         if self.time and truth.valid_at <= self.time[-1]:
             return  # repeated, or out of order: rare, and the neighbours tell nearly the same
         height = truth.height_m if truth.height_m is not None else truth.altitude_msl_m
@@ -61,9 +70,27 @@ class _Truths:
         self.msl.append(truth.height_m is None)
 
     def forget_before(self, time: int) -> None:
+        """Let go of what is older than an instant, but for the last before it."""
         keep = int(np.searchsorted(np.array(self.time, dtype=np.int64), time))
         for column in (self.time, self.latitude_rad, self.longitude_rad, self.height_m, self.msl):
             del column[: max(keep - 1, 0)]
+
+    def runway_m(self, times: NDArray[np.int64], frame: RunwayFrame, separation_m: float) -> Floats:
+        """Interpolated positions (n, 3) in the runway frame at times (n,); NaN outside, and where the truth has a gap.
+
+        `separation_m` lifts what is only known above mean sea level.
+        """
+        known = np.array(self.time, dtype=np.int64)
+        if len(known) < 2:
+            return np.full((len(times), 3), np.nan)
+        height = np.array(self.height_m) + np.where(self.msl, separation_m, 0.0)
+        path = frame.runway_from_geodetic(self.latitude_rad, self.longitude_rad, height)
+        after = np.clip(np.searchsorted(known, times), 1, len(known) - 1)
+        gap = known[after] - known[after - 1]
+        share = (times - known[after - 1]) / gap
+        inside = (gap <= _LARGEST_GAP_NS) & (share >= 0.0) & (share <= 1.0)
+        there = path[after - 1] + share[:, None] * (path[after] - path[after - 1])
+        return np.where(inside[:, None], there, np.nan)
 
 
 class Accuracy:
@@ -73,7 +100,7 @@ class Accuracy:
         self._frame = RunwayFrame(runway)
         self._separation_m = runway.geoid_separation_m or 0.0
         self._separation_is_given = runway.geoid_separation_m is not None
-        self._truths: defaultdict[str, _Truths] = defaultdict(_Truths)
+        self._truths: defaultdict[str, Truths] = defaultdict(Truths)
         self._waiting: defaultdict[tuple[str, str], list[tuple[int, Floats]]] = defaultdict(list)
         self._errors: defaultdict[str, array[float]] = defaultdict(lambda: array("f"))
         self._settled_at: int | None = None
@@ -128,32 +155,24 @@ class Accuracy:
         for truths in self._truths.values():
             truths.forget_before(min(now - _WAIT_FOR_TRUTH_NS, truths.time[-1]) if truths.time else 0)
 
-    def _distances(self, truths: _Truths, rows: list[tuple[int, Floats]]) -> Floats:
+    def _distances(self, truths: Truths, rows: list[tuple[int, Floats]]) -> Floats:
         """Distance of each row to the interpolated truth (m); NaN where the truth has a gap or a component lacks."""
-        known = np.array(truths.time, dtype=np.int64)
-        height = np.array(truths.height_m) + np.where(truths.msl, self._separation_m, 0.0)
-        path = self._frame.runway_from_geodetic(truths.latitude_rad, truths.longitude_rad, height)
         times = np.array([time for time, _ in rows], dtype=np.int64)
-        after = np.clip(np.searchsorted(known, times), 1, max(len(known) - 1, 1))
-        if len(known) < 2:
-            return np.full(len(rows), np.nan)
-        gap = known[after] - known[after - 1]
-        share = (times - known[after - 1]) / gap
-        inside = (gap <= _LARGEST_GAP_NS) & (share >= 0.0) & (share <= 1.0)
-        there = path[after - 1] + share[:, None] * (path[after] - path[after - 1])
-        return np.where(inside, np.linalg.norm(np.array([row for _, row in rows]) - there, axis=1), np.nan)
+        there = truths.runway_m(times, self._frame, self._separation_m)
+        return np.asarray(np.linalg.norm(np.array([row for _, row in rows]) - there, axis=1))
 
     def scores(self) -> dict[str, Score]:
         """Scores by what was scored: "gps", "radar", and the fused track by its state ("fused", "gps only", ...)."""
         if self._settled_at is not None:
             self._settle(self._settled_at + _SETTLE_NS)
         return {
-            kind: _score(np.array(self._errors[kind], dtype=np.float64))
+            kind: score_of(np.array(self._errors[kind], dtype=np.float64))
             for kind in sorted(self._errors)
             if self._errors[kind]
         }
 
 
-def _score(errors: Floats) -> Score:
+def score_of(errors: Floats) -> Score:
+    """The score of some distances, at least one."""
     median, p95 = np.quantile(errors, [0.5, 0.95])
     return Score(len(errors), float(np.sqrt(np.mean(errors**2))), float(median), float(p95))

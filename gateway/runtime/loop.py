@@ -138,9 +138,11 @@ def run_replay(
     watch: Watch = _nobody,
     asked_to_stop: AskedToStop = _never,
     step_ns: int | None = None,
+    tell_smoothed: Callable[[float], None] = lambda share: None,
 ) -> Summary:
     """Run recordings again: as fast as it goes, or at `speed` times their pace. Any `step_ns` gives the same numbers.
 
+    `tell_smoothed` hears how far the smoothing at the end is, from 0 to 1.
     Raises RunFailure when the archive cannot be written.
     """
     if step_ns is None:
@@ -167,7 +169,7 @@ def run_replay(
             raise RunFailure(
                 f"Nothing in this recording{unbelieved} tells where the runway is; give a site file with --site."
             )
-        return run.finish(ended)
+        return run.finish(ended, tell_smoothed)
 
 
 def steps(

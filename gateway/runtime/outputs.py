@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import errno
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.fuse import Fused, Lanes
 from gateway.picture import Picture
 from gateway.runtime.publisher import Publisher, open_publisher
-from gateway.runtime.setup import Serve
-from gateway.runtime.urls import LinkError, Url
+from gateway.runtime.setup import Setup
+from gateway.runtime.smoothed import Smoothing
+from gateway.runtime.summary import SmoothedSummary
+from gateway.runtime.urls import LinkError
 from gateway.settings import Site
 from gateway.sinks import Sink
 from gateway.sinks.arrow import ArrowSink
-from gateway.sinks.parquet import finish
+from gateway.sinks.parquet import SmoothedTable, finish
 from gateway.sinks.publish import PublishSink
 from gateway.sinks.rerun import RerunSink
 
@@ -23,38 +30,32 @@ _UNWATCHED = (30.0, 4096)  # where a recording is replayed as fast as it goes: f
 
 
 class Outputs:
-    """The sinks of one session. `watched`: somebody looks on, or the session must survive a kill; small batches then.
+    """The sinks of one session, and the smoothing after it where that is asked for.
 
+    Where somebody looks on, or the session must survive a kill, rows go out in small batches.
     Raises OSError when what must be kept could not be, LinkError when the viewers' port is taken or tracks cannot be
     published where they should be.
     """
 
-    def __init__(
-        self,
-        site: Site,
-        folder: Path | None,
-        serve: Serve | None,
-        *,
-        watched: bool = True,
-        publish: Url | None = None,
-        publish_system: int = 1,
-        publish_leave_out: frozenset[str] = frozenset(),
-    ) -> None:
+    def __init__(self, site: Site, folder: Path | None, setup: Setup) -> None:
         self._folder = folder
         self._sinks: list[Sink] = []
         self._rerun: RerunSink | None = None
         self._publisher: Publisher | None = None
         self._published: PublishSink | None = None
-        if publish is not None:
-            self._publisher = open_publisher(publish)
-            self._published = PublishSink(self._publisher.send, system=publish_system, leave_out=publish_leave_out)
+        self._smoothing = Smoothing(site, setup.options, folder) if setup.smooth else None
+        if setup.publish is not None:
+            self._publisher = open_publisher(setup.publish)
+            self._published = PublishSink(
+                self._publisher.send, system=setup.publish_system, leave_out=setup.publish_leave_out
+            )
             self._sinks.append(self._published)
         if folder is not None:
             separation_m = site.runway.geoid_separation_m or 0.0
-            period_s = _TABLES_WATCHED_S if watched else _UNWATCHED[0]
+            period_s = _TABLES_WATCHED_S if setup.is_watched else _UNWATCHED[0]
             self._sinks.append(ArrowSink(folder, geoid_separation_m=separation_m, period_s=period_s))
-        if folder is not None or serve is not None:
-            self._rerun = _rerun(site, folder, serve, watched)
+        if folder is not None or setup.serve is not None:
+            self._rerun = _rerun(site, folder, setup)
             self._sinks.append(self._rerun)
 
     @property
@@ -86,6 +87,33 @@ class Outputs:
         """Hand one picture to every sink."""
         for sink in self._sinks:
             sink.write(picture)
+        if self._smoothing is not None:
+            self._smoothing.add(picture)
+
+    def smooth(self, lanes: Lanes, tell: Callable[[float], None]) -> None:
+        """Smooth every track, if that was asked for, from what was written and what the lanes still hold."""
+        if self._smoothing is None:
+            return
+        table = SmoothedTable(self._folder) if self._folder is not None else None
+
+        def give(rows: Fused, step: NDArray[np.int64]) -> None:
+            if table is not None:
+                table.write(rows)
+            if self._rerun is not None:
+                self._rerun.write_smoothed(rows, step)
+
+        try:
+            self._smoothing.finish(lanes, give, tell)
+            if table is not None:
+                table.finish()
+        except BaseException:
+            if table is not None:
+                table.abandon()
+            raise
+
+    def smoothed(self) -> SmoothedSummary | None:
+        """What smoothing came to, if that was asked for."""
+        return SmoothedSummary(self._smoothing.rows, self._smoothing.scores()) if self._smoothing is not None else None
 
     def close(self) -> None:
         """A clean end: everything written out, the tables as Parquet."""
@@ -96,6 +124,8 @@ class Outputs:
     def abandon(self) -> None:
         """Close every sink, whatever one of them says."""
         failure: OSError | None = None
+        if self._smoothing is not None:
+            self._smoothing.close()
         for sink in self._sinks:
             try:
                 sink.close()
@@ -107,14 +137,16 @@ class Outputs:
             raise failure
 
 
-def _rerun(site: Site, folder: Path | None, serve: Serve | None, watched: bool) -> RerunSink:
-    period_s, rows_limit = _WATCHED if watched else _UNWATCHED
+def _rerun(site: Site, folder: Path | None, setup: Setup) -> RerunSink:
+    serve = setup.serve
+    period_s, rows_limit = _WATCHED if setup.is_watched else _UNWATCHED
     try:
         return RerunSink(
             site,
             path=None if folder is None else folder / RRD_FILE,
             serve=None if serve is None else (serve.host, serve.port),
             name=site.name if folder is None else folder.name,
+            modes=setup.options.estimator in ("imm", "rmimm"),
             period_s=period_s,
             rows_limit=rows_limit,
         )

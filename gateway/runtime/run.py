@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -91,15 +91,7 @@ class Run:
         if self._recorder is not None:
             self._recorder.describe(site=place.text, site_origin=place.origin)
         try:
-            self.outputs = Outputs(
-                place.site,
-                self.folder,
-                self.setup.serve,
-                watched=self.setup.is_watched,
-                publish=self.setup.publish,
-                publish_system=self.setup.publish_system,
-                publish_leave_out=self.setup.publish_leave_out,
-            )
+            self.outputs = Outputs(place.site, self.folder, self.setup)
         except OSError as error:
             raise self._failure(error) from error
 
@@ -246,10 +238,15 @@ class Run:
         reason = (error.strerror or str(error)).lower()
         return RunFailure(f"{where} could not be written ({reason}); the session ends here, what was written is whole.")
 
-    def finish(self, ended: str) -> Summary:
-        """Close everything, make the Parquet files, complete session.json; the summary."""
+    def finish(self, ended: str, tell: Callable[[float], None] = lambda share: None) -> Summary:
+        """Smooth, where that was asked for; close everything, make the Parquet files, complete session.json; the summary.
+
+        `tell` hears how much has been smoothed, from 0 to 1.
+        """
         self.flush()
         try:
+            if self.outputs is not None and self._state is not None:
+                self.outputs.smooth(self._state.lanes, tell)
             if self.outputs is not None:
                 self.outputs.close()
             summary = self._summary(ended)
@@ -295,5 +292,6 @@ class Run:
             associations_lost=tally.changes["lost"] if tally else 0,
             counters=self._counters(),
             accuracy=tally.accuracy.scores() if tally else {},
+            smoothed=self.outputs.smoothed() if self.outputs else None,
             archive=self.folder,
         )

@@ -46,5 +46,6 @@ class Setup:
     signing_key: bytes | None = field(default=None, repr=False)  # of MAVLink; None: frames are believed unchecked
     live: bool = False
     is_watched: bool = True  # False: drawn in large batches, for a replay as fast as it goes that nobody looks at
+    smooth: bool = False  # make smoothed tracks when it is over
     name: str = ""  # of the session's folder; without one the site's
     command: tuple[str, ...] = ()

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gateway.picture import Picture, SourceHealth
-from gateway.runtime.accuracy import Accuracy, Score
+from gateway.runtime.accuracy import Accuracy, Score, SmoothedScore
 from gateway.settings import Runway
 
 KINDS = {
@@ -23,6 +23,14 @@ KINDS = {
     "Intent": "intents",
     "Truth": "truths",
 }
+
+
+@dataclass(frozen=True, slots=True)
+class SmoothedSummary:
+    """What smoothing came to: rows, and by the tracks' state how far they are from the truth before and after it."""
+
+    rows: int
+    accuracy: dict[str, SmoothedScore] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +53,7 @@ class Summary:
     associations_lost: int
     counters: dict[str, int]
     accuracy: dict[str, Score] = field(default_factory=dict)
+    smoothed: SmoothedSummary | None = None  # None: nobody asked for it
     archive: Path | None = None
 
     def document(self) -> dict[str, Any]:

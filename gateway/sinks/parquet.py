@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,7 +10,8 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from gateway.sinks.arrow import SCHEMAS
+from gateway.fuse import Fused
+from gateway.sinks.arrow import SCHEMAS, TRACKS, tracks_batch
 
 ROW_GROUP = 16384  # rows gathered before Parquet is handed a row group: bounds memory, keeps compression good
 
@@ -55,6 +57,54 @@ def whole_batches(stream: Path) -> Iterator[pa.RecordBatch]:
             yield batch
 
 
+class SmoothedTable:
+    """smoothed.parquet, with the columns of tracks.parquet, written when a session is over. Raises OSError on a full disk.
+
+    It stands beside itself (`.part`) until it is complete.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._target = folder / "smoothed.parquet"
+        self._part = self._target.with_name(self._target.name + ".part")
+        self._writer = pq.ParquetWriter(self._part, TRACKS, compression="zstd", use_dictionary=_texts(TRACKS))
+        self._waiting: list[Fused] = []
+
+    def write(self, fused: Fused) -> None:
+        """Take some rows."""
+        self._waiting.append(fused)
+        if sum(len(part.time) for part in self._waiting) >= ROW_GROUP:
+            self._flush()
+
+    def _flush(self) -> None:
+        if self._waiting:
+            waiting, self._waiting = self._waiting, []
+            self._writer.write_batch(tracks_batch(waiting))
+
+    def finish(self) -> None:
+        """The file in its place, whole."""
+        self._flush()
+        self._writer.close()
+        _place(self._part, self._target)
+
+    def abandon(self) -> None:
+        """Leave nothing behind."""
+        with contextlib.suppress(OSError):  # what brought us here is what is told
+            self._writer.close()
+        self._part.unlink(missing_ok=True)
+
+
+def _texts(schema: pa.Schema) -> list[str]:
+    """Numbers hardly repeat: a dictionary of them takes most of the time and of the memory, and makes the file larger."""
+    return [field.name for field in schema if pa.types.is_string(field.type)]
+
+
+def _place(part: Path, target: Path) -> None:
+    """A file that is complete, to its name."""
+    with open(part, "rb") as written:
+        os.fsync(written.fileno())
+    os.replace(part, target)
+
+
 def _completed(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
     """A batch with null in the columns that the release which wrote it did not have yet."""
     if batch.schema.equals(schema):
@@ -66,9 +116,7 @@ def _completed(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
 
 def _convert(stream: Path, target: Path, schema: pa.Schema) -> None:
     part = target.with_name(target.name + ".part")
-    # numbers hardly repeat: a dictionary of them takes most of the time and of the memory, and makes the file larger
-    texts = [field.name for field in schema if pa.types.is_string(field.type)]
-    with pq.ParquetWriter(part, schema, compression="zstd", use_dictionary=texts) as writer:
+    with pq.ParquetWriter(part, schema, compression="zstd", use_dictionary=_texts(schema)) as writer:
         waiting: list[pa.RecordBatch] = []
         rows = 0
         for batch in whole_batches(stream):
@@ -79,6 +127,4 @@ def _convert(stream: Path, target: Path, schema: pa.Schema) -> None:
                 waiting, rows = [], 0
         if waiting:
             writer.write_table(pa.Table.from_batches(waiting, schema))
-    with open(part, "rb") as written:
-        os.fsync(written.fileno())
-    os.replace(part, target)
+    _place(part, target)

@@ -5,6 +5,10 @@ from __future__ import annotations
 import uuid
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.fuse import Fused
 from gateway.picture import Picture
 from gateway.settings import Site
 from gateway.sinks.blueprint import blueprint
@@ -17,6 +21,7 @@ from gateway.sinks.scene.paths import ApproachScene, PredictScene
 from gateway.sinks.scene.plans import PlanScene
 from gateway.sinks.scene.scope import ScopeScene
 from gateway.sinks.scene.site import SiteScene
+from gateway.sinks.scene.smoothed import SmoothedScene
 from gateway.sinks.scene.sources import SourceScene, raw_positions
 from gateway.sinks.scene.stages import StageScene
 from gateway.sinks.scene.tracks import TrackScene
@@ -61,6 +66,7 @@ class RerunSink:
         self._flights, self._sources, self._tracks = Flights(site), SourceScene(site), TrackScene(site)
         self._approach, self._predict, self._stages = ApproachScene(site), PredictScene(site), StageScene(site)
         self._scope, self._health, self._plans = ScopeScene(site), HealthScene(), PlanScene(site)
+        self._smoothed = SmoothedScene(site)
         self._period_ns, self._rows_limit = round(period_s * 1e9), rows_limit
         self._waiting: list[Picture] = []
         self._rows = 0
@@ -90,6 +96,10 @@ class RerunSink:
         if self._rows >= self._rows_limit or now - self._drawn_at >= self._period_ns:
             self._drawn_at = now
             self._draw()
+
+    def write_smoothed(self, fused: Fused, step: NDArray[np.int64]) -> None:
+        """Draw smoothed rows of one track in the order of time, and the numbers of their pictures; raises OSError."""
+        self._send(self._smoothed.entries(fused, step))
 
     def close(self) -> None:
         """Draw what waits, end the file, make it small, end the server; calling it again does nothing."""

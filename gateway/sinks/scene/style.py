@@ -12,6 +12,7 @@ Colour = tuple[int, int, int] | tuple[int, int, int, int]
 GPS: Colour = (255, 150, 30)
 RADAR: Colour = (60, 140, 255)
 FUSED: Colour = (235, 50, 50)
+SMOOTHED: Colour = (90, 235, 235)  # what later measurements made of it
 
 TRUTH: Colour = (150, 150, 150)
 PREDICTED: Colour = (255, 140, 160)
