@@ -19,6 +19,7 @@ Floats = NDArray[np.float64]
 TRUE, SOURCE, RADAR_COLOR = [150, 150, 150], [255, 140, 0], [60, 120, 255]
 COLORS = {"ecef": [60, 120, 255], "geodetic": [255, 140, 0], "polar": [40, 170, 90]}
 ROUNDS = range(6)
+ENLARGED = 10.0  # of the errors beside the track, which is 200 km long
 LEAST_M = 1e-10  # of a logarithm
 
 
@@ -40,7 +41,10 @@ def _blueprint() -> rrb.Blueprint:
         rrb.TimeSeriesView(origin=f"/rounds/{part}", name=f"{part}'s track: log10 of what is left, m")
         for part in ("source", "radar")
     ]
-    tabs = rrb.Tabs(rrb.Grid(*views, name="Tracks (figure 2)"), rrb.Vertical(*rounds, name="Rounds (figure 3)"))
+    tabs = rrb.Tabs(
+        rrb.Grid(*views, name="Tracks (figure 2), errors ten times as large"),
+        rrb.Vertical(*rounds, name="Rounds (figure 3)"),
+    )
     return rrb.Blueprint(tabs, rrb.TimePanel(timeline="round", state="collapsed"), collapse_panels=True)
 
 
@@ -55,14 +59,15 @@ def _tracks(recording: rr.RecordingStream, part: str, errors: Errors | None) -> 
     step = _equator_km(case.geodetic)
     off_source = difference("ecef", place, case.polar, geodetic).off - true.off
     off_radar = true.off - difference("ecef", place, polar, case.geodetic).off
-    for name, off, color in (
-        ("true", np.zeros_like(off_source), TRUE),
-        ("source", off_source, SOURCE),
-        ("radar", off_radar, RADAR_COLOR),
+    for name, off, color, labelled in (
+        ("true", np.zeros_like(off_source), TRUE, 1),
+        ("source", off_source, SOURCE, 4),
+        ("radar", off_radar, RADAR_COLOR, 7),
     ):
-        points = step + 1e-3 * off[:, :2] * [1.0, -1.0]  # y points down in a 2D view
+        points = step + 1e-3 * ENLARGED * off[:, :2] * [1.0, -1.0]  # y points down in a 2D view
         radii = rr.Radius.ui_points(4.0 if name != "true" else 2.5)
-        drawn = rr.Points2D(points, labels=[name], colors=color, radii=radii)
+        labels = [name if place == labelled else "" for place in range(len(points))]
+        drawn = rr.Points2D(points, labels=labels, show_labels=True, colors=color, radii=radii)
         recording.log(f"/tracks/{part}/{name}", drawn, static=True)
 
 
