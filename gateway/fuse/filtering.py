@@ -81,7 +81,8 @@ def _advance(
         rows, before, chosen, seen = zip(*members, strict=True)
         elapsed_s = np.array([(measure.at - base.at) / SECOND for base, measure in zip(before, chosen, strict=True)])
         memory = stacked([base.memory for base in before])
-        after = estimator.advance(before, Group(kind, radar, chosen, seen, elapsed_s, memory))
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):  # what comes of it is begun anew
+            after = estimator.advance(before, Group(kind, radar, chosen, seen, elapsed_s, memory))
         all_sound = is_sound(after.state)
         for i, row in enumerate(rows):
             far = far_row(before[i]) if after.far[i] else (0, NEVER)
