@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from gateway.runtime.run import Run
 
 ENDS_S = 1.0
-SETTLED_S = 8.0  # the first pairs, the first tracks
+SETTLED_S = 12.0  # the first pairs, the first tracks
 CASES = (("vehicles", 100, 30.0), ("traffic", 1000, 50.0))
 
 
