@@ -16,6 +16,8 @@ from gateway.align import SECOND, Plot
 
 GREATEST_SPEED_MPS = 600.0  # beyond any aircraft that a landing radar meets
 GREATEST_SILENCE_S = 10.0
+PLOTS_AT_MOST = 1024  # of one radar track
+TRACKS_AT_MOST = 10_000
 
 Key = tuple[int, int, int]  # radar, number, episode
 Number = tuple[int, int]  # radar, number
@@ -86,9 +88,16 @@ class RadarTracks:
         place = bisect_right(known, (plot.at, plot.serial), key=lambda other: (other.at, other.serial))
         before = self.places.get(key) if known else None
         place_now = (before or Place(plot.at, math.nan, math.nan, *plot.sigma[:2])).then(plot)
-        plots = {**self.plots, key: (*known[:place], plot, *known[place:])}
+        plots = {**self.plots, key: (*known[:place], plot, *known[place:])[-PLOTS_AT_MOST:]}
         places = {**self.places, key: place_now}
         return RadarTracks(plots, places, episodes, self.closed, silent, self.first_episode), key
+
+    def has_room(self, plot: Plot) -> bool:
+        """Whether a plot's radar track is known, or one more can be kept."""
+        if len(self.plots) < TRACKS_AT_MOST:
+            return True
+        number = (plot.radar, plot.number)
+        return (*number, self.episode.get(number, -1)) in self.plots
 
     def _is_new(self, key: Key, known: tuple[Plot, ...], plot: Plot) -> bool:
         """Whether a plot with this number begins another radar track than the number's present one."""

@@ -21,6 +21,7 @@ from gateway.track import Key, RadarTracks
 PLOT_MARGIN_S = 4.0  # plots are remembered this much longer than reports: a report's check looks back over them
 CONTRADICTION_M = 5.0  # between the site's and the streams' geoid: beyond this it is said
 NAMED_AT_MOST = 20  # sources whose times are unusable that are told by name
+AIRCRAFT_AT_MOST, RADARS_AT_MOST, SAID_AT_MOST = 10_000, 64, 500  # a bound on what strangers can make us remember
 STAGED = (GpsReport, RadarPlot, RadarStatus)
 
 Tracked = list[tuple[Plot, Key]]
@@ -143,7 +144,8 @@ class Work:
                 self.fixes.append(fix)
                 if fix.has_height:
                     self._judge_heights()
-                if observation.timing is not Timing.FOREIGN and self._is_timely(fix.at, fix.aircraft):
+                timely = observation.timing is not Timing.FOREIGN and self._is_timely(fix.at, fix.aircraft)
+                if timely and self._has_room(fix.aircraft):
                     fixes.append(fix)
             elif isinstance(observation, RadarPlot):
                 plot = self._placed_plot(observation)
@@ -186,14 +188,16 @@ class Work:
     def _take_status(self, status: RadarStatus) -> None:
         """A radar's word of where it stands: used where the site file has none, compared with it otherwise."""
         said, known = align.radar_from_status(status, self.frame), self.radars.get(status.radar)
-        if known is None:
+        if known is None and len(self.radars) >= RADARS_AT_MOST:
+            self.count("status of more radars than are kept")
+        elif known is None:
             self.radars = {**self.radars, status.radar: said}
             self._settle()
             self._see_radars()
             self.once(
                 f"radar {status.radar} is not in the site file: it is taken to stand where its status says", "info"
             )
-        elif text := align.contradiction(known, said):
+        elif known is not None and (text := align.contradiction(known, said)):
             told = f"radar {status.radar} says that it {text} than the site file says: the site file is used"
             self.once(told, topic=f"where radar {status.radar} stands")
 
@@ -221,13 +225,22 @@ class Work:
         self.once(f"{who} {how}: such data are counted, not used")
         return False
 
+    def _has_room(self, aircraft: str) -> bool:
+        """Whether an aircraft is known, or one more can be kept; if not it is counted, and said once."""
+        known = self.lanes.by_aircraft
+        if len(known) < AIRCRAFT_AT_MOST or aircraft in known:
+            return True
+        self.count("reports of more aircraft than are kept")
+        self.once(f"more than {AIRCRAFT_AT_MOST} aircraft at a time: the reports of the others are counted, not used")
+        return False
+
     # track --------------------------------------------------------------------------------------------------------
 
     def track(self, plots: Sequence[Plot]) -> Tracked:
         """The plots that the radar numbered, each with its radar track."""
         tracked = []
         for plot in plots:
-            if plot.number == 0:
+            if plot.number == 0 or not self.tracks.has_room(plot):
                 self.untracked += 1
                 continue
             self.tracks, key = self.tracks.after(plot)
@@ -367,7 +380,7 @@ class Work:
     def once(self, text: str, level: str = "warning", topic: str = "") -> None:
         """Say something, the first time only; of a topic only the first, whatever numbers are in it."""
         about = topic or text
-        if about not in self.said:
+        if about not in self.said and len(self.said) < SAID_AT_MOST:
             self.said |= {about}
             self.events.append(Event(self.now or 0, level, text))
 

@@ -164,7 +164,7 @@ def pruned(state: Association, before: int) -> Association:
     Aircraft that were last counted long before it, and have no radar track, are forgotten with their counters.
     """
     checks = tuple(check for check in state.checks if check.fix.at >= before)
-    if len(checks) == len(state.checks):
+    if len(checks) == len(state.checks) and not (state.chosen or state.ledger.counts):
         return state
     spans = state.ledger.spans
     latest = {span.key: span.index for span in spans}

@@ -12,6 +12,8 @@ from gateway.fuse.filtering import Event
 from gateway.settings import Options
 from gateway.track import Key, name_of
 
+EVENTS_AT_MOST = 1024  # of one track: a source of more than 100 measurements a second has a shorter history
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lane:
@@ -35,13 +37,16 @@ class Lane:
 
     def with_events(self, events: tuple[Event, ...]) -> Lane:
         """The same with another past. Written out: on the hot path `dataclasses.replace` would cost four times this."""
+        whole = self.whole
+        if len(events) > EVENTS_AT_MOST:
+            events, whole = events[-EVENTS_AT_MOST:], False
         return Lane(
             self.track,
             self.aircraft,
             self.key,
             self.ordinal,
             events,
-            self.whole,
+            whole,
             self.ended_at,
             self.emptied_at,
             self.origin,

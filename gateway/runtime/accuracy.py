@@ -1,11 +1,12 @@
 """How far GPS reports, radar plots and the fused track were from the truth, where a simulator tells it.
 
 Only read from pictures, never fed back. Scores are settled every few seconds, so memory does not grow with the
-pictures: one float an error remains.
+pictures: some thousands of errors remain, evenly over the session.
 """
 
 from __future__ import annotations
 
+import math
 from array import array
 from collections import defaultdict
 from collections.abc import Iterable
@@ -22,6 +23,8 @@ from gateway.settings import Runway
 _SETTLE_NS = 5_000_000_000
 _WAIT_FOR_TRUTH_NS = 15_000_000_000  # what no truth has caught up with by then is not scored
 _LARGEST_GAP_NS = 2_000_000_000  # between two truths that are interpolated
+_FORGOTTEN_NS = 60_000_000_000  # whose truth was told no later is gone
+_KEPT_AT_MOST = 100_000  # errors of one kind
 
 Floats = NDArray[np.float64]
 
@@ -42,6 +45,33 @@ class SmoothedScore:
 
     filtered: Score
     smoothed: Score
+
+
+class _Errors:
+    """Errors of a session however long: all of them while they are few, then each second one, each fourth, and so on.
+
+    So the scores of a short session are exact, and those of a long one are of errors from all of it.
+    """
+
+    __slots__ = ("count", "kept", "squares", "stride")
+
+    def __init__(self) -> None:
+        self.kept, self.stride, self.count, self.squares = array("f"), 1, 0, 0.0
+
+    def extend(self, errors: Floats) -> None:
+        first = -self.count % self.stride
+        self.count += len(errors)
+        self.squares += float(np.sum(errors**2))
+        self.kept.extend(errors[first :: self.stride].tolist())
+        while len(self.kept) > _KEPT_AT_MOST:
+            self.kept = self.kept[::2]
+            self.stride *= 2
+
+    def score(self) -> Score:
+        kept = score_of(np.array(self.kept, dtype=np.float64))
+        if self.stride == 1:
+            return kept
+        return Score(self.count, math.sqrt(self.squares / self.count), kept.median_m, kept.p95_m)
 
 
 class Truths:
@@ -102,7 +132,7 @@ class Accuracy:
         self._separation_is_given = runway.geoid_separation_m is not None
         self._truths: defaultdict[str, Truths] = defaultdict(Truths)
         self._waiting: defaultdict[tuple[str, str], list[tuple[int, Floats]]] = defaultdict(list)
-        self._errors: defaultdict[str, array[float]] = defaultdict(lambda: array("f"))
+        self._errors: defaultdict[str, _Errors] = defaultdict(_Errors)
         self._settled_at: int | None = None
 
     def add(self, picture: Picture) -> None:
@@ -151,9 +181,12 @@ class Accuracy:
             rows[:] = [row for row in rows if max(truths.time[-1], now - _WAIT_FOR_TRUTH_NS) < row[0]]
             if ready:
                 errors = self._distances(truths, ready)
-                self._errors[kind].extend(float(error) for error in errors[np.isfinite(errors)])
+                self._errors[kind].extend(errors[np.isfinite(errors)])
         for truths in self._truths.values():
             truths.forget_before(min(now - _WAIT_FOR_TRUTH_NS, truths.time[-1]) if truths.time else 0)
+        gone = now - _FORGOTTEN_NS
+        for name in [name for name, truths in self._truths.items() if truths.time and truths.time[-1] < gone]:
+            del self._truths[name]
 
     def _distances(self, truths: Truths, rows: list[tuple[int, Floats]]) -> Floats:
         """Distance of each row to the interpolated truth (m); NaN where the truth has a gap or a component lacks."""
@@ -165,11 +198,7 @@ class Accuracy:
         """Scores by what was scored: "gps", "radar", and the fused track by its state ("fused", "gps only", ...)."""
         if self._settled_at is not None:
             self._settle(self._settled_at + _SETTLE_NS)
-        return {
-            kind: score_of(np.array(self._errors[kind], dtype=np.float64))
-            for kind in sorted(self._errors)
-            if self._errors[kind]
-        }
+        return {kind: errors.score() for kind, errors in sorted(self._errors.items()) if errors.count}
 
 
 def score_of(errors: Floats) -> Score:

@@ -284,7 +284,7 @@ class Run:
             epoch_offset_s=self._decoder.epoch_offset_s or 0,
             sources=rows,
             observations=tally.named_observations() if tally else {},
-            tracks=len(tally.tracks) if tally else 0,
+            tracks=tally.tracks if tally else 0,
             aircraft=tuple(sorted(tally.aircraft)) if tally else (),
             track_rows=tally.track_rows if tally else 0,
             predictions=tally.predictions if tally else 0,

@@ -11,6 +11,8 @@ from gateway.picture import Picture, SourceHealth
 from gateway.runtime.accuracy import Accuracy, Score, SmoothedScore
 from gateway.settings import Runway
 
+_NAMED_AT_MOST = 10_000
+
 KINDS = {
     "GpsReport": "GPS reports",
     "RadarPlot": "radar plots",
@@ -69,8 +71,8 @@ class Tally:
     def __init__(self, runway: Runway) -> None:
         self.observations: Counter[str] = Counter()
         self.traffic = 0  # GPS reports of aircraft that others told of
-        self.tracks: set[int] = set()
-        self.aircraft: set[str] = set()
+        self.tracks = 0  # they are numbered from 1 on, and each has rows
+        self.aircraft: set[str] = set()  # the first of them, at most so many as can be read
         self.changes: Counter[str] = Counter()
         self.track_rows = 0
         self.predictions = 0
@@ -81,8 +83,9 @@ class Tally:
         """Count one picture."""
         self.observations.update(type(observation).__name__ for observation in picture.observations)
         self.traffic += sum(not name.startswith("mavlink:") for name in picture.align.report_aircraft)
-        self.tracks.update(picture.fuse.track.tolist())
-        self.aircraft.update(name for name in picture.fuse.aircraft if name is not None)
+        self.tracks = max(self.tracks, int(picture.fuse.track.max(initial=0)))
+        if len(self.aircraft) < _NAMED_AT_MOST:
+            self.aircraft.update(name for name in picture.fuse.aircraft if name is not None)
         self.changes.update(change.kind for change in picture.associate.changes)
         self.track_rows += len(picture.fuse.time)
         self.predictions += len(picture.predict.made)

@@ -43,6 +43,7 @@ _SECOND = 1_000_000_000
 _SPREAD = 0.6180339887498949  # the golden section: any number of tracks falls evenly over the second
 _ECHO_NS = 120 * _SECOND  # an autopilot keeps what it heard for up to a minute
 _LATELY_NS = 10 * _SECOND
+_SIMULATED_AT_MOST = 1000  # before those that said so long ago are forgotten
 
 
 @dataclass(slots=True)
@@ -108,6 +109,9 @@ class PublishSink:
         for one in observations:
             if isinstance(one, RadarPlot) and one.simulated:
                 self._simulated[f"{one.radar}/{one.track_number}"] = one.valid_at
+        if len(self._simulated) > _SIMULATED_AT_MOST:
+            newest = max(self._simulated.values())
+            self._simulated = {name: at for name, at in self._simulated.items() if at > newest - _LATELY_NS}
 
     def _keep(self, fused: Fused, now: int) -> None:
         """The newest measured row of each track that is, or was, confirmed; tracks that ended go."""
