@@ -140,6 +140,9 @@ def own_terms(state: Estimate) -> Terms:
 
 def _now(state: Estimate, density: Floats) -> Terms:
     """The filter's own terms now: those of the last update, over the interval since."""
+    if not state.since_s.any():  # just after an update
+        ss, sv, sa, vv, va, aa = state.terms
+        return ss, sv, sa, vv, va, aa
     return carried(state.terms, state.since_s, _shaken(state, density) * state.since_s)
 
 

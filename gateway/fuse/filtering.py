@@ -73,7 +73,7 @@ def _advance(
         if base is None:
             first, belief = estimator.begin(measure)
             nothing = np.full((model.memory, 3), np.nan)
-            events[row] = _event(measure, first, 0, nothing, None, False, belief)
+            events[row] = _event(measure, first.mean[0], first.covariance[0], nothing, belief, None)
             continue
         near = neighbours[row](measure) if literal and isinstance(measure, Fix) and measure.has_height else None
         groups.setdefault(_group(measure, near), []).append((row, base, measure, near))
@@ -84,12 +84,14 @@ def _advance(
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):  # what comes of it is begun anew
             after = estimator.advance(before, Group(kind, radar, chosen, seen, elapsed_s, memory))
         all_sound = is_sound(after.state)
-        for i, row in enumerate(rows):
-            far = far_row(before[i]) if after.far[i] else (0, NEVER)
-            kept = after.memory[i], before[i], bool(after.outlying[i]), after.beliefs[i]
-            score = score_after(before[i], chosen[i], model)
-            event = _event(chosen[i], after.state, i, *kept, score, *far)
-            events[row] = event if all_sound and not may_be_lost(event) else _begun_again(event, estimator)
+        states = zip(after.state.mean, after.state.covariance, after.memory, after.beliefs, strict=True)
+        told = zip(after.outlying.tolist(), after.far.tolist(), strict=True)
+        for row, base, measure, state, (outlying, far) in zip(rows, before, chosen, states, told, strict=True):
+            far_off, far_since = far_row(base) if far else (0, NEVER)
+            score = score_after(base, measure, model)
+            event = _event(measure, *state, base, outlying, score, far_off, far_since)
+            lost = (far_off and may_be_lost(event)) or not all_sound
+            events[row] = _begun_again(event, estimator) if lost else event
     return [events[row] for row in range(len(measures))]
 
 
@@ -126,12 +128,12 @@ def _group(measure: Measure, near: Near | None) -> tuple[str, int]:
 
 def _event(
     measure: Measure,
-    after: Estimate,
-    row: int,
+    mean: Floats,
+    covariance: Floats,
     memory: Floats,
-    base: Event | None,
-    outlying: bool,
     belief: Belief,
+    base: Event | None,
+    outlying: bool = False,
     score: float = 0.0,
     far_off: int = 0,
     far_since: int = NEVER,
@@ -149,7 +151,6 @@ def _event(
         height_at = measure.at
     # The longest recent interval, forgotten slowly: tells a source of one report each 5 s from one that fell silent.
     interval = max(measure.at - base.at, base.interval - base.interval // 8) if base else 0
-    mean, covariance = after.mean[row], after.covariance[row]
     return Event(
         measure,
         mean,

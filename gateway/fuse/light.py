@@ -133,8 +133,7 @@ class LightFilter:
         else:
             plots = [measure for measure in group.measures if isinstance(measure, Plot)]
             polar, spread = np.array([plot.polar for plot in plots]), np.array([plot.sigma for plot in plots])
-        known = light.track_covariance(state)[:, _S, _S]
-        position, sigma, share = completed(polar, spread, state.position, known, frame)
+        position, sigma, share = completed(polar, spread, state.position, _position_variance(state), frame)
         return light.update(state, position, sigma, self.tuning, share=share)
 
     def _reported(self, state: light.Estimate, group: Group) -> tuple[light.Estimate, Innovation, Floats]:
@@ -145,22 +144,20 @@ class LightFilter:
         speed_sigma = np.array([fix.velocity_sigma_mps for fix in fixes])[:, None]
         by_source = np.ones_like(position)
         expected = state.position if state.error is None else state.position + state.error[3]
-        known = light.track_covariance(state)
         off = position - expected
         if group.kind == "in part":
             has_height = np.array([fix.has_height for fix in fixes])
             off, faster = _in_part(fixes, off, state.velocity)
             velocity = state.velocity + faster
-            off[:, 2], sigma = _held(
-                off[:, 2], sigma, position[:, 2] - state.position[:, 2], known[:, 2, 2], has_height
-            )
+            known = _position_variance(state)[:, 2]
+            off[:, 2], sigma = _held(off[:, 2], sigma, position[:, 2] - state.position[:, 2], known, has_height)
             by_source[:, 2] = has_height
         memory = group.memory
         if memory.shape[1]:
             remembered = np.concatenate([memory, off[:, None]], axis=1)
             square = np.where(np.isnan(remembered), 0.0, remembered * remembered)
             mean_square = square.sum(axis=1) / np.maximum((~np.isnan(remembered)).sum(axis=1), 1)
-            sigma = np.sqrt(np.maximum(sigma * sigma, mean_square - known[:, _S, _S]))
+            sigma = np.sqrt(np.maximum(sigma * sigma, mean_square - _position_variance(state)))
             memory = remembered[:, 1:]
         after, told = light.update(
             state, state.position + off, sigma, self.tuning, velocity, speed_sigma, by_source=by_source
@@ -203,6 +200,12 @@ def _held(
 def _with_error(state: light.Estimate, error: Floats | None) -> light.Estimate:
     kept = state.terms, state.since_s, state.density, state.surprises, state.p, state.sped_s
     return light.Estimate(state.position, state.velocity, state.acceleration, *kept, error)
+
+
+def _position_variance(state: light.Estimate) -> Floats:
+    """(n, 3), with what the source's error is not known by."""
+    own = light.own_terms(state)[0]
+    return own if state.error is None else own + state.error[0] * state.error[0] * state.error[4]
 
 
 def _current(state: light.Estimate) -> Estimate:
