@@ -138,7 +138,7 @@ class Pieces:
         found, states, begins = [], [], []
         for time, row in _in_order(past.events, coasted, last_of, rows.time):
             event = settled.get(time)
-            state = self._coasted(past.now, time) if event is None else _state(event)
+            state = self._coasted(past.now, time) if event is None else state_of(event)
             if state is None:
                 continue
             past.now = time, state
@@ -151,7 +151,7 @@ class Pieces:
         if not found:
             return [], waits
         at = np.array(found)
-        mean, covariance, weight = _arrays(states)
+        mean, covariance, weight = arrays_of(states)
         return [Piece(chosen(rows, at), step[at], np.array(begins), mean, covariance, weight)], waits
 
     def _coasted(self, now: tuple[int, Estimate | Mixture] | None, time: int) -> Estimate | Mixture | None:
@@ -170,7 +170,8 @@ def _begins(event: Event) -> bool:
     return event.interval == 0 or event.restarted is not None
 
 
-def _state(event: Event) -> Estimate | Mixture:
+def state_of(event: Event) -> Estimate | Mixture:
+    """The whole state after a measurement: by mode, where there are modes."""
     return event.mixture or Estimate(event.mean[None], event.covariance[None])
 
 
@@ -195,8 +196,8 @@ def _in_order(
     return ordered
 
 
-def _arrays(states: Sequence[Estimate | Mixture]) -> tuple[Floats, Floats, Floats]:
-    """Means, covariances and weights by mode."""
+def arrays_of(states: Sequence[Estimate | Mixture]) -> tuple[Floats, Floats, Floats]:
+    """Means (n, m, 9), covariances (n, m, 9, 9) and weights (n, m) of some states by mode."""
     mean = np.array([state.mean.reshape(-1, SIZE) for state in states])
     covariance = np.array([state.covariance.reshape(-1, SIZE, SIZE) for state in states])
     weight = np.array([state.weight[0] if isinstance(state, Mixture) else (1.0,) for state in states])

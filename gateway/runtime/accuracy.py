@@ -47,7 +47,7 @@ class SmoothedScore:
     smoothed: Score
 
 
-class _Errors:
+class Errors:
     """Errors of a session however long: all of them while they are few, then each second one, each fourth, and so on.
 
     So the scores of a short session are exact, and those of a long one are of errors from all of it.
@@ -59,6 +59,7 @@ class _Errors:
         self.kept, self.stride, self.count, self.squares = array("f"), 1, 0, 0.0
 
     def extend(self, errors: Floats) -> None:
+        """Take some more."""
         first = -self.count % self.stride
         self.count += len(errors)
         self.squares += float(np.sum(errors**2))
@@ -68,6 +69,7 @@ class _Errors:
             self.stride *= 2
 
     def score(self) -> Score:
+        """The score of all of them, at least one."""
         kept = score_of(np.array(self.kept, dtype=np.float64))
         if self.stride == 1:
             return kept
@@ -132,7 +134,7 @@ class Accuracy:
         self._separation_is_given = runway.geoid_separation_m is not None
         self._truths: defaultdict[str, Truths] = defaultdict(Truths)
         self._waiting: defaultdict[tuple[str, str], list[tuple[int, Floats]]] = defaultdict(list)
-        self._errors: defaultdict[str, _Errors] = defaultdict(_Errors)
+        self._errors: defaultdict[str, Errors] = defaultdict(Errors)
         self._settled_at: int | None = None
 
     def add(self, picture: Picture) -> None:

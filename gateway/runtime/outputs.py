@@ -104,6 +104,9 @@ class Outputs:
 
         try:
             self._smoothing.finish(lanes, give, tell)
+            if self._rerun is not None:
+                for track, at, step in self._smoothing.ended:
+                    self._rerun.end_smoothed(track, at, step)
             if table is not None:
                 table.finish()
         except BaseException:

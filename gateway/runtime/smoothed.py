@@ -6,7 +6,6 @@ one model and two thousand for four modes; in memory is a piece at a time.
 
 from __future__ import annotations
 
-from array import array
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -21,7 +20,7 @@ from gateway.fuse.weighting import Model
 from gateway.offline.pieces import Piece, Pieces
 from gateway.offline.smoothing import Smoothed, smoothed
 from gateway.picture import Picture
-from gateway.runtime.accuracy import SmoothedScore, Truths, score_of
+from gateway.runtime.accuracy import Errors, SmoothedScore, Truths
 from gateway.runtime.spool import Kept, Spool
 from gateway.settings import Options, Site
 
@@ -42,6 +41,7 @@ class Smoothing:
 
     def __init__(self, site: Site, options: Options, folder: Path | None) -> None:
         self.rows = 0
+        self.ended: list[tuple[int, int, int]] = []  # tracks, when they ended, and in which picture
         self._frame = RunwayFrame(site.runway)
         self._separation_m = site.runway.geoid_separation_m
         self._model = Model.of(options, site.position, {})
@@ -52,19 +52,17 @@ class Smoothing:
             list
         )  # of each piece, it and where it truly was
         self._truths: defaultdict[str, Truths] = defaultdict(Truths)
-        self._errors: defaultdict[str, tuple[array[float], array[float]]] = defaultdict(
-            lambda: (array("f"), array("f"))
-        )
+        self._errors: defaultdict[str, tuple[Errors, Errors]] = defaultdict(lambda: (Errors(), Errors()))
 
     def add(self, picture: Picture) -> None:
         """Take from a picture what smoothing needs."""
         for truth in picture.truth:
             self._truths[truth.aircraft].add(truth)
+        self.ended += [(one.track, max(one.at, picture.now), picture.step) for one in picture.fuse.ended]
         self._pieces.add(picture.fuse, picture.step, picture.now)
         if self._pieces.due:
             self._keep(self._pieces.take())
-            for truths in self._truths.values():
-                truths.forget_before(picture.now - _TRUTHS_KEPT_NS)
+            self._forget_truths(picture.now - _TRUTHS_KEPT_NS)
 
     def finish(self, lanes: Lanes, give: Give, tell: Callable[[float], None]) -> None:
         """Smooth every track, in the order of their numbers, and give its rows; tell the share that is done."""
@@ -90,13 +88,10 @@ class Smoothing:
 
     def scores(self) -> dict[str, SmoothedScore]:
         """Scores by the state of the track ("fused", "gps only", ...), and of "all" rows, where the truth is known."""
-        kinds = [kind for kind in sorted(self._errors) if kind != ALL and self._errors[kind][0]]
+        kinds = [kind for kind in sorted(self._errors) if kind != ALL and self._errors[kind][0].count]
         if len(kinds) > 1:
             kinds.append(ALL)
-        return {
-            kind: SmoothedScore(*(score_of(np.array(part, dtype=np.float64)) for part in self._errors[kind]))
-            for kind in kinds
-        }
+        return {kind: SmoothedScore(*(errors.score() for errors in self._errors[kind])) for kind in kinds}
 
     def close(self) -> None:
         """Let go of the disk; calling it again does nothing."""
@@ -120,7 +115,14 @@ class Smoothing:
         for state in (*dict.fromkeys(one.rows.state), ALL):
             rows = known & ((states == state) | (state == ALL))
             for kept, errors in zip(self._errors[state], (filtered, after), strict=True):
-                kept.extend(errors[rows].tolist())
+                kept.extend(errors[rows])
+
+    def _forget_truths(self, before: int) -> None:
+        for truths in self._truths.values():
+            truths.forget_before(before)
+        gone = [name for name, truths in self._truths.items() if not truths.time or truths.time[-1] < before]
+        for name in gone:
+            del self._truths[name]
 
     def _true_m(self, rows: Fused) -> Floats:
         """Where the aircraft truly was, in the runway frame (n, 3); NaN where nothing tells it."""

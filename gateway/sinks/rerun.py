@@ -101,6 +101,10 @@ class RerunSink:
         """Draw smoothed rows of one track in the order of time, and the numbers of their pictures; raises OSError."""
         self._send(self._smoothed.entries(fused, step))
 
+    def end_smoothed(self, track: int, at: int, step: int) -> None:
+        """A track ended then, in that picture, and leaves the scene; raises OSError."""
+        self._send(self._smoothed.end(track, at, step))
+
     def close(self) -> None:
         """Draw what waits, end the file, make it small, end the server; calling it again does nothing."""
         try:

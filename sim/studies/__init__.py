@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 STUDIES = (
     "fusion",
+    "smoothing",
     "alpha-beta-gamma",
     "rmimm",
     "registration",

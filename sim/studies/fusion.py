@@ -8,7 +8,7 @@ times from t = 20 s, in three dimensions. Source: 003, 3.1 and 3.2.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -105,6 +105,30 @@ def measures_of(case: Case, index: int) -> Measures:
 
 def measure_accuracy(case: Case, method: str, estimator: EstimatorName = "kalman") -> Accuracy:
     """RMSE of one method over all runs of a case; a method is a weighting, "radar alone" or "GPS alone"."""
+    histories, _ = filtered(case, method, estimator, range(case.runs))
+    estimated = np.array([positions_at(events, case.plot_s) for events in histories])
+    found = np.array([events[-1].mean[6:] for events in histories])
+    true_error = np.array(
+        [case.gps_parameters.error_east_m, case.gps_parameters.error_north_m, case.gps_parameters.error_up_m]
+    )
+    error_found = float(np.sqrt(((found - true_error) ** 2).mean())) if method == "bias" else math.nan
+    return accuracy_of(case, estimated, error_found)
+
+
+def accuracy_of(case: Case, estimated: Floats, error_found_m: float = math.nan) -> Accuracy:
+    """RMSE of positions (runs, t, 3) at the radar's times."""
+    square = ((estimated - case.true_enu_m) ** 2).sum(axis=-1)
+    counted = case.plot_s >= COUNTED_FROM_S
+
+    def rmse(chosen: NDArray[np.bool_]) -> float:
+        return float(np.sqrt(square[:, chosen].mean()))
+
+    first, second, third = (rmse(counted & (case.along_m <= far) & (case.along_m > near)) for far, near in BANDS_M)
+    return Accuracy(rmse(counted), (first, second, third), error_found_m)
+
+
+def filtered(case: Case, method: str, estimator: EstimatorName, runs: Iterable[int]) -> tuple[list[list[Event]], Model]:
+    """The states that a method's filter goes through in some runs of a case, and its model."""
     weighting: Weighting = method if method in WEIGHTINGS else "covariance"
     options = Options(estimator=estimator, weighting=weighting)
     frame = RunwayFrame(case.site.runway)
@@ -112,7 +136,7 @@ def measure_accuracy(case: Case, method: str, estimator: EstimatorName = "kalman
     model = Model.of(options, case.site.position, radars)
     setting = associate.Setting(case.site, options, frame, radars)
     jobs = []
-    for index in range(case.runs):
+    for index in runs:
         heard = measures_of(case, index)
         wanted: list[Fix | Plot] = [] if method == "radar alone" else list(heard.fixes)
         if method == "radar alone":
@@ -122,21 +146,7 @@ def measure_accuracy(case: Case, method: str, estimator: EstimatorName = "kalman
             since = times[1] if times is not None else None
             wanted += [plot for plot in heard.plots if since is not None and plot.at >= since]
         jobs.append(Job(index, None, sorted(wanted, key=rank), _neighbour(heard, options)))
-    histories = run_filter(jobs, model)
-    estimated = np.array([positions_at(events, case.plot_s) for events in histories])
-    found = np.array([events[-1].mean[6:] for events in histories])
-    true_error = np.array(
-        [case.gps_parameters.error_east_m, case.gps_parameters.error_north_m, case.gps_parameters.error_up_m]
-    )
-    error_found = float(np.sqrt(((found - true_error) ** 2).mean())) if method == "bias" else math.nan
-    square = ((estimated - case.true_enu_m) ** 2).sum(axis=-1)
-    counted = case.plot_s >= COUNTED_FROM_S
-
-    def rmse(chosen: NDArray[np.bool_]) -> float:
-        return float(np.sqrt(square[:, chosen].mean()))
-
-    first, second, third = (rmse(counted & (case.along_m <= far) & (case.along_m > near)) for far, near in BANDS_M)
-    return Accuracy(rmse(counted), (first, second, third), error_found)
+    return run_filter(jobs, model), model
 
 
 def positions_at(events: Sequence[Event], time_s: Floats) -> Floats:

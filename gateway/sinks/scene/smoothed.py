@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gateway.fuse import Fused
 from gateway.settings import Site
 from gateway.sinks.scene import style
-from gateway.sinks.scene.entry import Always, Entry, entity, rows
+from gateway.sinks.scene.entry import Always, Entry, entity, once, rows
 from gateway.sinks.scene.trail import Trail
 
 Ints = NDArray[np.int64]
@@ -41,6 +41,10 @@ class SmoothedScene:
         entries.append(rows(path, fused.time, step, *place))
         entries.append(rows(self._sigma(track), fused.time, step, rr.Scalars.columns(scalars=sigma)))
         return entries + self._trail.extend(fused.time, step, fused.runway_m, lat_lon)
+
+    def end(self, track: int, at: int, step: int) -> list[Entry]:
+        """A track that ended leaves the scene."""
+        return [once(entity("fuse", "smoothed", track), at, step, rr.Clear.columns(is_recursive=[True]))]
 
     def _sigma(self, track: int) -> str:
         return entity("fuse", "sigma", "smoothed", track)
