@@ -25,7 +25,6 @@ from gateway.estimators.axis_covariance import (
     Three,
     carried,
     matrices,
-    positions_and_velocities,
     reduced,
     settled,
     with_velocity,
@@ -119,18 +118,8 @@ def ahead(state: Estimate, elapsed_s: Floats, fades_in_s: float) -> tuple[Three,
 
 def covariance(state: Estimate) -> Floats:
     """The covariance now as matrices (n, axes, 3, 3) over position, velocity, acceleration of each axis."""
-    return matrices(_whole(state))
-
-
-def track_covariance(state: Estimate) -> Floats:
-    """The covariance now as matrices (n, 2 axes, 2 axes) over the positions and then the velocities; axes are independent."""
-    return positions_and_velocities(_whole(state))
-
-
-def _whole(state: Estimate) -> Terms:
-    """The covariance's terms now, each (n, axes), with what the position source's error is not known by."""
     terms = own_terms(state)
-    return terms if state.error is None else source_error.spread(terms, state.error)
+    return matrices(terms if state.error is None else source_error.spread(terms, state.error))
 
 
 def own_terms(state: Estimate) -> Terms:

@@ -85,14 +85,3 @@ def with_velocity(terms: Floats, noise: Floats) -> tuple[Three, Floats, Floats]:
 def matrices(terms: Terms) -> Floats:
     """The terms, each (n, axes), as matrices (n, axes, 3, 3) over position, velocity, acceleration of each axis."""
     return np.moveaxis(np.array(terms)[PLACES], (0, 1), (-2, -1))
-
-
-def positions_and_velocities(terms: Terms) -> Floats:
-    """The terms as matrices (n, 2 axes, 2 axes) over the positions and then the velocities of independent axes."""
-    ss, sv, _, vv, _, _ = terms
-    axes = ss.shape[-1]
-    along = np.arange(axes)
-    matrix = np.zeros((*ss.shape[:-1], 2 * axes, 2 * axes))
-    matrix[..., along, along], matrix[..., along + axes, along + axes] = ss, vv
-    matrix[..., along, along + axes] = matrix[..., along + axes, along] = sv
-    return matrix

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gateway.estimators.alpha_beta_gamma import Estimate, Tuning, covariance, predict, start, track_covariance, update
+from gateway.estimators.alpha_beta_gamma import Estimate, Tuning, covariance, predict, start, update
 from gateway.estimators.axis_covariance import settled
 from gateway.estimators.completed_plots import completed
 from gateway.estimators.source_error import begun
@@ -28,6 +28,17 @@ def _tracks(n: int, rng: np.random.Generator, tuning: Tuning) -> Estimate:
     speed = np.where(rng.random((n, 3)) < 0.3, np.nan, 100.0 * rng.standard_normal((n, 3)))
     state = start(1e4 * rng.standard_normal((n, 3)), rng.uniform(1.0, 100.0, (n, 3)), tuning, speed, 2.0)
     return replace(state, error=begun(rng.integers(0, 2, (n, 3)).astype(np.float64), 30.0))
+
+
+def track_covariance(state: Estimate) -> Floats:
+    """Over the positions and then the velocities of independent axes, (n, 2 axes, 2 axes)."""
+    single = covariance(state)
+    n, axes = single.shape[:2]
+    matrix, along = np.zeros((n, 2 * axes, 2 * axes)), np.arange(axes)
+    for i in range(2):
+        for j in range(2):
+            matrix[:, along + axes * i, along + axes * j] = single[:, :, i, j]
+    return matrix
 
 
 def _worked(state: Estimate, steps: list[tuple[Floats, ...]], tuning: Tuning) -> Estimate:

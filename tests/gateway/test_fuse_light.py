@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gateway.align import Fix, Local
-from gateway.estimators.alpha_beta_gamma import Tuning, start, track_covariance, update
+from gateway.estimators.alpha_beta_gamma import Tuning, covariance, start, update
 from gateway.estimators.alpha_beta_gamma import predict as predict_light
 from gateway.estimators.kalman import ERROR, POSITION, VELOCITY
 from gateway.estimators.source_error import begun
@@ -245,7 +245,7 @@ def test_with_the_best_gains_it_is_the_kalman_filter_with_the_sources_error(worl
         assert state.error is not None
         found = np.array([state.position[0, 0], state.velocity[0, 0], state.acceleration[0, 0], state.error[3, 0, 0]])
         np.testing.assert_allclose(found, mean, rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(track_covariance(state)[0], joint[:2, :2], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(covariance(state)[0, 0], joint[:3, :3], rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(state.error[4, 0, 0], joint[3, 3], rtol=1e-9)
 
 
