@@ -21,6 +21,7 @@ import rerun.blueprint as rrb
 from gateway.sinks.scene.entry import Always, Entry, send
 
 BATCHES_WAITING = 512  # for a viewer that stands still: some 200 s and 20 MB of them, then they are dropped
+KEPT_AT_MOST = 10_000  # looks and names that wait for it: of some thousand tracks
 _STREAM_HEADER = 12
 _MESSAGE_HEADER = struct.Struct("<QQ")
 STOP_S = 5.0  # a viewer that stands still does not hold up the end of the session for longer
@@ -118,7 +119,7 @@ class ServedFeed:
 
     `host` is what it listens on, `port` 0 takes a free one; `address` is what a viewer opens. A late viewer
     gets what the `memory_limit` still holds, and the blueprint. `send` never blocks: when a viewer stands
-    still and the queue is full, rows are dropped and counted in `dropped`, what holds at all times is kept.
+    still and the queue is full, rows are dropped and counted in `dropped`; of what holds at all times the newest is kept.
     Raises OSError if the port is taken.
     """
 
@@ -147,7 +148,7 @@ class ServedFeed:
             self._waiting.put_nowait(batch)
             self._kept = []
         except queue.Full:
-            self._kept = [entry for entry in batch if isinstance(entry, Always)]
+            self._kept = [entry for entry in batch if isinstance(entry, Always)][-KEPT_AT_MOST:]
             self.dropped += sum(len(entry.time) for entry in entries if not isinstance(entry, Always))
 
     def _run(self) -> None:

@@ -96,6 +96,19 @@ def test_a_viewer_that_takes_nothing_costs_rows_for_viewers_and_none_for_the_fil
     assert path.stat().st_size == pytest.approx(alone.stat().st_size, rel=0.01)
 
 
+def test_behind_a_viewer_that_takes_nothing_not_everything_waits(tmp_path, pictures, monkeypatch):
+    """Of the looks of new tracks, which are not dropped, a bounded number waits."""
+    go_on = threading.Event()
+    monkeypatch.setattr(feed, "send", lambda stream, entries: go_on.wait(30.0))
+    monkeypatch.setattr(feed, "BATCHES_WAITING", 1)
+    monkeypatch.setattr(feed, "KEPT_AT_MOST", 5)
+    sink = RerunSink(DEMO_SITE, serve=("127.0.0.1", 0))
+    write_all(sink, pictures(10.0))
+    assert len(sink._served._kept) <= 5
+    go_on.set()
+    sink.close()
+
+
 def test_closing_twice_is_closing_once(tmp_path, pictures):
     sink = RerunSink(DEMO_SITE, path=tmp_path / "session.rrd", serve=("127.0.0.1", 0))
     sink.write(pictures(0.2)[0])

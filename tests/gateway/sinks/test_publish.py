@@ -260,3 +260,23 @@ def _fields_of(frame: bytes) -> dict[str, Any]:
     fields = dialect.MAVLink(None).parse_buffer(frame)[0].to_dict()
     fields.pop("mavpackettype")
     return {**fields, "callsign": fields["callsign"].encode()}
+
+
+def test_a_tentative_track_is_not_told_until_it_is_confirmed() -> None:
+    """To whoever hears us it would be an aircraft like any other; once it was confirmed it stays told."""
+    told = Told()
+    told.at(0.0, row(1, 0.0, life="tentative"))
+    told.until(3.0)
+    assert not told.reports()
+    told.at(3.1, row(1, 3.1))
+    told.until(6.0)
+    assert len(told.reports()) >= 2
+
+
+def test_which_radar_tracks_are_simulated_is_remembered_of_the_latest() -> None:
+    """Of thousands of numbers that a simulated radar gives, in an hour, those of the last ten seconds stay."""
+    told = Told()
+    for number in range(3000):
+        at = START + number * SECOND
+        told.at(float(number), saw=[RadarPlot(1, number, at, at, 1000.0, 0.0, 0.0, simulated=True)])
+    assert len(told.sink._simulated) <= 1001

@@ -281,6 +281,32 @@ def test_without_a_height_the_label_says_so_and_no_vertical_is_drawn(tmp_path, p
     assert set(shown) == {1}  # of elevation and azimuth, the latter
 
 
+def test_a_track_looks_as_sure_as_it_is(tmp_path, pictures):
+    """Tentative: dim, and said so. Confirmed: red. Coasting: pale, with how far off it may be in the label."""
+    told = {}
+    for life, state in (("tentative", "gps only"), ("confirmed", "fused"), ("coasting", "coasting")):
+        made = []
+        for picture in pictures(20.0, first_s=300.0):
+            rows = len(picture.fuse.time)
+            made.append(replace(picture, fuse=replace(picture.fuse, life=(life,) * rows, state=(state,) * rows)))
+        record(tmp_path / f"{life}.rrd", made)
+        entities = read(tmp_path / f"{life}.rrd")
+        colours = {
+            int(row[column][0])
+            for path, column in (("/fuse/1", "Points3D:colors"), ("/fuse/1/ellipsoid", "Ellipsoids3D:colors"))
+            for row in entities[path]
+            if "utc" in row
+        }
+        label = next(row["Points3D:labels"][0] for row in entities["/fuse/1/label"] if "utc" in row)
+        told[life] = colours, label.splitlines()[0]
+    assert len({frozenset(colours) for colours, _ in told.values()}) == 3
+    assert all(len(colours) == 1 for colours, _ in told.values())
+    assert [label for _, label in told.values()] == [
+        *("mavlink:1 gps only, tentative", "mavlink:1 fused"),
+        "mavlink:1 coasting ± 32 m",  # 3 sigma of 9 m and 12 m
+    ]
+
+
 def test_memory_is_bounded_by_who_was_there_lately(pictures):
     """Forty minutes in which a new aircraft appears every ten seconds: what is drawn is not remembered beyond ten minutes."""
     (picture,) = pictures(0.2)
