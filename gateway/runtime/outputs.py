@@ -43,7 +43,6 @@ class Outputs:
         self._rerun: RerunSink | None = None
         self._publisher: Publisher | None = None
         self._published: PublishSink | None = None
-        self._smoothing = Smoothing(site, setup.options, folder) if setup.smooth else None
         if setup.publish is not None:
             self._publisher = open_publisher(setup.publish)
             self._published = PublishSink(
@@ -57,6 +56,7 @@ class Outputs:
         if folder is not None or setup.serve is not None:
             self._rerun = _rerun(site, folder, setup)
             self._sinks.append(self._rerun)
+        self._smoothing = Smoothing(site, setup.options, folder) if setup.smooth else None
 
     @property
     def address(self) -> str | None:
