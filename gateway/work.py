@@ -368,7 +368,7 @@ class Work:
 
     def _see_radars(self) -> None:
         self.radar_frames = {number: RadarFrame.of(radar, self.frame) for number, radar in self.radars.items()}
-        self.model = Model.of(self.options, self.site.position, self.radar_frames)
+        self.model = Model.of(self.options, self.site.position, self.radar_frames, self.site.estimation)
         self.setting = Setting(self.site, self.options, self.frame, self.radar_frames)
 
     # counting, saying, and the result -----------------------------------------------------------------------------

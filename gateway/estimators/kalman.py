@@ -44,6 +44,8 @@ class Innovation:
     outlying: Bools  # (n,) so far out that the noise was raised
     sensitivity: Floats  # (n, m, 9) or (1, m, 9), the measurement's derivative by the state, 0 where not measured
     inverse: Floats  # (n, m, m) of the covariance
+    gain: Floats  # (n, 9, m)
+    noise: Floats  # (n, m) variances of the measurement's noise, raised where it lay too far out
 
     @property
     def log_likelihood(self) -> Floats:
@@ -172,7 +174,7 @@ def update(
     noise = (gain * r[:, None, :]) @ gain.transpose(0, 2, 1)
     covariance = reduced @ state.covariance @ reduced.transpose(0, 2, 1) + noise
     covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))
-    told = Innovation(y, s, measured, normalised, outlying, h, np.asarray(inverse))
+    told = Innovation(y, s, measured, normalised, outlying, h, np.asarray(inverse), gain, r)
     return Estimate(mean, covariance), told
 
 

@@ -27,8 +27,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.estimators.kalman import POSITION, SIZE, Estimate, Innovation, Motion
+from gateway.estimators.actual_error import carried_on, corrected
+from gateway.estimators.kalman import SIZE, Estimate, Innovation, Motion
 from gateway.estimators.kalman import update as update_each
+from gateway.estimators.mean_residual import excess, faded, in_metres, mean_size_m
+from gateway.estimators.mixed_innovation import Told
 from gateway.estimators.turning import carried
 
 Floats = NDArray[np.float64]
@@ -40,7 +43,6 @@ LEAST_SPEED_MPS = 5.0  # below it a bank says nothing of the turn rate
 LEAST_WEIGHT = 1e-6  # of a mode: none is ever impossible
 MEAN_PERIOD_S = 1.0  # the paper's period: in this time the mean counts once, however often it is measured
 WINDOW = 5  # residuals that `literal` takes the mean of
-LEAST_RESIDUAL_M = 1e-3  # `literal` is singular at 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +119,8 @@ class Mixture:
     information: Floats
     recent: Floats
     elapsed_s: Floats  # (n,) since the last measurement
+    error: Floats  # (n, 9, 9) of the combined state, as `actual_error` has it
+    unmixed: Floats  # (n, m) the weights before the modes last mixed
 
     def each(self) -> Estimate:
         """The modes' states as n m rows, those of one track together."""
@@ -133,6 +137,8 @@ class Mixture:
             self.information[one],
             self.recent[one],
             self.elapsed_s[one],
+            self.error[one],
+            self.unmixed[one],
         )
 
 
@@ -148,49 +154,9 @@ def stacked(rows: Sequence[Mixture]) -> Mixture:
         np.concatenate([row.information for row in rows]),
         np.concatenate([row.recent for row in rows]),
         np.concatenate([row.elapsed_s for row in rows]),
+        np.concatenate([row.error for row in rows]),
+        np.concatenate([row.unmixed for row in rows]),
     )
-
-
-@dataclass(frozen=True, slots=True)
-class Told:
-    """What measurements of k components told n tracks, in all: the modes' innovations as one Gaussian."""
-
-    prior: Floats  # (n, m) the modes' weights before it
-    each: Innovation  # of every mode, n m rows
-    mode_log_likelihood: Floats  # (n, m)
-
-    @property
-    def innovation(self) -> Floats:
-        """(n, k), 0 where nothing was measured."""
-        return np.asarray((self.prior[:, None, :] @ self._shaped(self.each.innovation))[:, 0])
-
-    @property
-    def covariance(self) -> Floats:
-        """(n, k, k), with the spread between the modes."""
-        off = self._shaped(self.each.innovation) - self.innovation[:, None]
-        spread = self._shaped(self.each.covariance) + off[..., :, None] * off[..., None, :]
-        return np.asarray((self.prior[:, :, None, None] * spread).sum(axis=1))
-
-    @property
-    def normalised(self) -> Floats:
-        """Squared, y' S^-1 y, (n,)."""
-        y = self.innovation[:, :, None]
-        return np.asarray((y.transpose(0, 2, 1) @ np.linalg.inv(self.covariance) @ y)[:, 0, 0])
-
-    @property
-    def outlying(self) -> Bools:
-        """Whether no mode expected it, (n,), so that its noise was raised."""
-        return self.each.outlying.reshape(self.prior.shape)[:, 0]
-
-    @property
-    def log_likelihood(self) -> Floats:
-        """Natural logarithm of the density of the measured components, (n,), under the mixture."""
-        log = np.log(self.prior) + self.mode_log_likelihood
-        greatest = log.max(axis=1)
-        return np.asarray(greatest + np.log(np.exp(log - greatest[:, None]).sum(axis=1)))
-
-    def _shaped(self, rows: Floats) -> Floats:
-        return rows.reshape(*self.prior.shape, *rows.shape[1:])
 
 
 def begin(state: Estimate, modes: Modes) -> Mixture:
@@ -204,6 +170,8 @@ def begin(state: Estimate, modes: Modes) -> Mixture:
         np.zeros((n, m, 3, 3)),
         np.full((n, m, WINDOW if modes.rule == "literal" else 0, 3), math.nan),
         np.zeros(n),
+        state.covariance.copy(),
+        np.repeat(modes.shares[None], n, axis=0),
     )
 
 
@@ -211,6 +179,15 @@ def combine(mixture: Mixture) -> Estimate:
     """One Gaussian a track with the mixture's mean and covariance. Source: 000 2.1.2 eq 14, 15."""
     mean, covariance = _matched(mixture.weight[:, :, None], mixture.mean, mixture.covariance)
     return Estimate(mean[:, 0], covariance[:, 0])
+
+
+def stated(mixture: Mixture) -> Estimate:
+    """What is told of each track: the mixture's mean, with the covariance of the error that it really has.
+
+    `combine` has the covariance that the filter reckons with.
+    """
+    mean, spread = _matched(mixture.weight[:, :, None], mixture.mean, np.zeros((1, 1, SIZE, SIZE)))
+    return Estimate(mean[:, 0], mixture.error + spread[:, 0])
 
 
 def predict(mixture: Mixture, elapsed_s: Floats, modes: Modes, transition: Floats | None = None) -> Mixture:
@@ -230,7 +207,10 @@ def predict(mixture: Mixture, elapsed_s: Floats, modes: Modes, transition: Float
     covariance = carry @ covariance @ carry.swapaxes(-1, -2) + noise
     covariance = 0.5 * (covariance + covariance.swapaxes(-1, -2))
     passed_s = mixture.elapsed_s + elapsed_s
-    return Mixture(mean, covariance, weight, mixture.score, mixture.information, mixture.recent, passed_s)
+    error, before = carried_on(mixture.error, weight, carry, noise), mixture.weight
+    return Mixture(
+        mean, covariance, weight, mixture.score, mixture.information, mixture.recent, passed_s, error, before
+    )
 
 
 def moved(mean: Floats, weight: Floats, elapsed_s: Floats, modes: Modes) -> tuple[Floats, Floats]:
@@ -286,42 +266,17 @@ def weigh(mixture: Mixture, after: Estimate, told: Innovation, modes: Modes) -> 
     score, information, recent = mixture.score, mixture.information, mixture.recent
     log = np.log(mixture.weight) + likelihood
     if modes.rule == "rmimm":
-        score, information = _faded(mixture, told, modes.fade ** (mixture.elapsed_s / MEAN_PERIOD_S))
+        score, information = faded(score, information, told, modes.fade ** (mixture.elapsed_s / MEAN_PERIOD_S))
         share = np.minimum(mixture.elapsed_s / MEAN_PERIOD_S, 1.0)
-        log -= (0.5 * share)[:, None] * np.log1p(_excess(score, information))
+        log -= (0.5 * share)[:, None] * np.log1p(excess(score, information))
     elif modes.rule == "literal":
-        recent = np.concatenate([recent[:, :, 1:], _in_metres(told).reshape(n, m, 1, 3)], axis=2)
-        mean = np.where(np.isnan(recent), 0.0, recent).sum(axis=2) / np.maximum((~np.isnan(recent)).sum(axis=2), 1)
-        log -= np.log(np.maximum(np.sqrt((mean * mean).sum(axis=2)), LEAST_RESIDUAL_M))
+        recent = np.concatenate([recent[:, :, 1:], in_metres(told).reshape(n, m, 1, 3)], axis=2)
+        log -= np.log(mean_size_m(recent))
     weight = np.exp(log - log.max(axis=1, keepdims=True))
     weight = np.maximum(weight / weight.sum(axis=1, keepdims=True), LEAST_WEIGHT)
     weight /= weight.sum(axis=1, keepdims=True)
     mean, covariance = after.mean.reshape(n, m, SIZE), after.covariance.reshape(n, m, SIZE, SIZE)
-    mixture_after = Mixture(mean, covariance, weight, score, information, recent, np.zeros(n))
-    return mixture_after, Told(mixture.weight, told, likelihood)
-
-
-def _faded(mixture: Mixture, told: Innovation, left: Floats) -> tuple[Floats, Floats]:
-    """Score and information after an update: h' S^-1 y, h' S^-1 h by the position, added to what is left of the old."""
-    sensitivity = told.sensitivity[:, :, POSITION]
-    by_position = sensitivity.transpose(0, 2, 1) @ told.inverse
-    score = (by_position @ told.innovation[:, :, None]).reshape(mixture.score.shape)
-    information = (by_position @ sensitivity).reshape(mixture.information.shape)
-    faded = left[:, None, None]
-    return faded * mixture.score + score, (faded * faded)[..., None] * mixture.information + information
-
-
-def _excess(score: Floats, information: Floats) -> Floats:
-    """s' J^-1 s, (n, m): chi-square with up to three degrees for a mode that is right; what was never measured adds 0."""
-    size = np.maximum(1e-9 * information[..., _AXES, _AXES].sum(axis=-1), 1e-30)
-    lifted = information + size[..., None, None] * np.eye(3)
-    return np.maximum((score[..., None, :] @ np.linalg.inv(lifted) @ score[..., :, None])[..., 0, 0], 0.0)
-
-
-_AXES = np.arange(3)
-
-
-def _in_metres(told: Innovation) -> Floats:
-    """Innovations as displacements of the position (n m, 3), by least squares."""
-    sensitivity = np.broadcast_to(told.sensitivity[:, :, POSITION], (*told.innovation.shape, 3))
-    return np.asarray((np.linalg.pinv(sensitivity) @ told.innovation[:, :, None])[:, :, 0])
+    _, reckoned = _matched(weight[:, :, None], mean, covariance)
+    error = corrected(mixture.error, weight, told, reckoned[:, 0])
+    mixture_after = Mixture(mean, covariance, weight, score, information, recent, np.zeros(n), error, weight)
+    return mixture_after, Told(mixture.weight, told, likelihood, mixture.error, mixture.unmixed)

@@ -134,7 +134,7 @@ class InteractingModels:
         nearest = each.normalised.reshape(n, m).min(axis=1)
         far = nearest > FAR_SIGMA**2 * np.maximum(each.measured.reshape(n, m, -1)[:, 0].sum(axis=1), 1)
         beliefs = [mixtures.row(i) for i in range(n)]
-        return Advanced(modes.combine(mixtures), beliefs, known, told.outlying, far)
+        return Advanced(modes.stated(mixtures), beliefs, known, told.outlying, far)
 
     def ahead(self, events: Sequence[Event], elapsed_s: Floats, *, far: bool) -> tuple[Estimate, Floats]:
         """See `Estimator`. Far ahead the likeliest mode is kept."""

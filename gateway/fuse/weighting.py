@@ -20,21 +20,15 @@ from gateway.estimators.alpha_beta_gamma import Tuning
 from gateway.estimators.kalman import ERROR, POSITION, SIZE, VELOCITY, Estimate, Innovation, Motion, start, update
 from gateway.estimators.modes import Mode, Modes
 from gateway.frames import RadarFrame, polar_from_xyz, polar_jacobian, xyz_from_polar
-from gateway.settings import Options, PositionSource, Weighting
+from gateway.settings import Estimation, Options, PositionSource, Weighting
 
 Floats = NDArray[np.float64]
 
 ROBUST_SIGMA = 3.0  # beyond this (for each degree of freedom) a measurement's pull is bounded
 START_SPEED_SIGMA_MPS = 100.0  # before anything is known of a velocity
 WINDOW = 8  # innovations remembered by `innovation`
+ACCELERATES_S = 1.0  # accelerations of modes are white over a second
 LEAST_RESIDUAL = 1e-3  # sigmas; the literal weights are singular at a residual of 0
-
-
-# Of the modes: what an aircraft that does nothing is shaken by, and one in a turn (0.5 m/s2 over a second).
-CALM_M2PS3, TURNING_M2PS3 = (0.0225,) * 3, (0.25,) * 3
-MANOEUVRE_SHARE = 0.5  # of the one model's density: turns are modes of their own
-CALM_TIME, MANOEUVRE_TIME, TURN_TIME = 6.0, 2.0, 1.0  # how much of its time an aircraft flies so, against each other
-MODE_LASTS_S = 6.0
 
 # Three sigmas for each degree of freedom, for the three of a position: all of them may lie in one axis.
 # An aircraft that flies straight for minutes must not teach the light filter that it never turns.
@@ -59,15 +53,21 @@ class Model:
     light: Tuning | None = None  # of the alpha-beta-gamma filter, which asks nothing of `motion` but the source's error
 
     @classmethod
-    def of(cls, options: Options, position: PositionSource, radars: Mapping[int, RadarFrame]) -> Model:
-        """The model that the options and the site's position source ask for."""
+    def of(
+        cls,
+        options: Options,
+        position: PositionSource,
+        radars: Mapping[int, RadarFrame],
+        estimation: Estimation = Estimation(),
+    ) -> Model:
+        """The model that the options, the site's position source and its estimation ask for."""
         level = options.acceleration_sigma_mps2**2 * options.acceleration_time_s
         upright = options.vertical_acceleration_sigma_mps2**2 * options.acceleration_time_s
         error = position.systematic_m / math.sqrt(3.0) if options.weighting == "bias" else 0.0
         motion = Motion((level, level, upright), error)
         confirm_score = math.log(options.confirm_odds)
         light = LIGHT if options.estimator == "alpha-beta-gamma" else None
-        return cls(options.weighting, motion, radars, modes_of(options, motion), confirm_score, light)
+        return cls(options.weighting, motion, radars, modes_of(options, motion, estimation), confirm_score, light)
 
     @property
     def together(self) -> int:
@@ -80,26 +80,30 @@ class Model:
         return WINDOW if self.weighting == "innovation" else 0
 
 
-def modes_of(options: Options, motion: Motion) -> Modes | None:
-    """The set of modes that the options ask for, or None for the one of `motion`.
+def modes_of(options: Options, motion: Motion, estimation: Estimation) -> Modes | None:
+    """The set of modes that the options ask for, as the site has them, or None for the one of `motion`.
 
     Straight flight comes in two: calm, in which noise is taken off best, and with changes of speed, climb or course that are
     no full turn.
     """
     if options.estimator == "kalman" or options.estimator == "alpha-beta-gamma":
         return None
-    east, north, up = motion.acceleration_density
-    straying = (MANOEUVRE_SHARE * east, MANOEUVRE_SHARE * north, MANOEUVRE_SHARE * up)
-    calm, manoeuvring, turning = (
-        replace(motion, acceleration_density=density) for density in (CALM_M2PS3, straying, TURNING_M2PS3)
-    )
+
+    def moving(level_mps2: float, upright_mps2: float) -> Motion:
+        level, upright = level_mps2**2 * ACCELERATES_S, upright_mps2**2 * ACCELERATES_S
+        return replace(motion, acceleration_density=(level, level, upright))
+
+    chosen = estimation
+    calm = moving(chosen.calm_acceleration_mps2, chosen.calm_acceleration_mps2)
+    manoeuvring = moving(chosen.manoeuvre_acceleration_mps2, chosen.manoeuvre_vertical_acceleration_mps2)
+    turning = moving(chosen.turn_acceleration_mps2, chosen.turn_acceleration_mps2)
     ways = (
-        Mode(0.0, calm, CALM_TIME),
-        Mode(0.0, manoeuvring, MANOEUVRE_TIME),
-        Mode(1.0, turning, TURN_TIME),
-        Mode(-1.0, turning, TURN_TIME),
+        Mode(0.0, calm, chosen.calm_share),
+        Mode(0.0, manoeuvring, chosen.manoeuvre_share),
+        Mode(1.0, turning, 0.5 * chosen.turn_share),
+        Mode(-1.0, turning, 0.5 * chosen.turn_share),
     )
-    return Modes(ways, options.estimator, MODE_LASTS_S)
+    return Modes(ways, options.estimator, chosen.mode_lasts_s, chosen.turn_rate_rps, chosen.bank_rad)
 
 
 def start_from_fixes(

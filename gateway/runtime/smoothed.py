@@ -44,7 +44,7 @@ class Smoothing:
         self.ended: list[tuple[int, int, int]] = []  # tracks, when they ended, and in which picture
         self._frame = RunwayFrame(site.runway)
         self._separation_m = site.runway.geoid_separation_m
-        self._model = Model.of(options, site.position, {})
+        self._model = Model.of(options, site.position, {}, site.estimation)
         self._pieces = Pieces(self._model)
         self._folder = folder
         self._spool = Spool(folder)

@@ -8,6 +8,7 @@ from gateway.settings.reading import SiteError, parse_site
 from gateway.settings.site import (
     DEMO_SITE,
     DecisionPoint,
+    Estimation,
     PositionSource,
     RadarSite,
     Runway,
@@ -23,6 +24,7 @@ __all__ = [
     "DEMO_SITE",
     "AssociationRule",
     "DecisionPoint",
+    "Estimation",
     "EstimatorName",
     "Mute",
     "Options",

@@ -29,7 +29,9 @@ class Mute:
 class Options:
     """What may be chosen for a run; everything in here changes numbers, so all of it is archived."""
 
-    estimator: EstimatorName = "kalman"  # constant velocity, straight and turns as interacting modes, or the light filter
+    estimator: EstimatorName = (
+        "kalman"  # constant velocity, straight and turns as interacting modes, or the light filter
+    )
     weighting: Weighting = "bias"
     association: AssociationRule = "default"
     acceleration_sigma_mps2: float = 2.0  # of the constant-velocity model, east and north

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gateway.settings.site import DecisionPoint, PositionSource, RadarSite, Runway, Site, Waypoint, Weather
+from gateway.settings.site import DecisionPoint, Estimation, PositionSource, RadarSite, Runway, Site, Waypoint, Weather
 
 
 class SiteError(ValueError):
@@ -107,6 +107,20 @@ _TABLES: dict[str, _Table] = {
             "velocity_sigma_mps": ("velocity_sigma_mps", _POSITIVE),
         }
     ),
+    "estimation": _Table(
+        {
+            "calm_acceleration_mps2": ("calm_acceleration_mps2", _number(1e-3, 100.0)),
+            "manoeuvre_acceleration_mps2": ("manoeuvre_acceleration_mps2", _number(1e-3, 100.0)),
+            "manoeuvre_vertical_acceleration_mps2": ("manoeuvre_vertical_acceleration_mps2", _number(1e-3, 100.0)),
+            "turn_acceleration_mps2": ("turn_acceleration_mps2", _number(1e-3, 100.0)),
+            "turn_rate_degps": ("turn_rate_rps", _number(0.01, 360.0, scale=_RAD)),
+            "bank_deg": ("bank_rad", _number(0.1, 85.0, scale=_RAD)),
+            "calm_share": ("calm_share", _number(1e-3, 1e3)),
+            "manoeuvre_share": ("manoeuvre_share", _number(1e-3, 1e3)),
+            "turn_share": ("turn_share", _number(1e-3, 1e3)),
+            "mode_lasts_s": ("mode_lasts_s", _number(0.1, 1e4)),
+        }
+    ),
     "radar": _Table(
         {
             "number": ("number", _whole(1, 65535)),
@@ -189,6 +203,7 @@ def parse_site(text: str, name: str = "site file") -> Site:
         name=title,
         runway=runway,
         position=PositionSource(**(rows("position") or [{}])[0]),
+        estimation=Estimation(**(rows("estimation") or [{}])[0]),
         radars=radars,
         decision_points=tuple(DecisionPoint(**row) for row in rows("decision_point")),
         waypoints=tuple(Waypoint(**row) for row in rows("waypoint")),
@@ -241,8 +256,8 @@ def _kind(value: object) -> str:
 
 def _hint(key: str, known: list[str]) -> str:
     """What the writer may have meant: the same quantity in another unit, or a near spelling."""
-    stem = re.sub(r"_(deg|rad|m|km|ft|nm|mps|kn)$", "", key)
-    same = [name for name in known if re.sub(r"_(deg|rad|m|mps)$", "", name) == stem]
+    stem = re.sub(r"_(deg|rad|m|km|ft|nm|mps|kn|mps2|degps|g)$", "", key)
+    same = [name for name in known if re.sub(r"_(deg|rad|m|mps|mps2|degps)$", "", name) == stem]
     if same:
         return f"; it is {same[0]} here (the unit is part of the name)"
     from difflib import get_close_matches

@@ -63,6 +63,25 @@ class RadarSite:
 
 
 @dataclass(frozen=True, slots=True)
+class Estimation:
+    """How aircraft fly, for the estimators of several modes; nobody has to tune it between drones and jets.
+
+    Accelerations are white over a second, on each axis. Shares are of an aircraft's time, against each other.
+    """
+
+    calm_acceleration_mps2: float = 0.15
+    manoeuvre_acceleration_mps2: float = 1.8  # straight, with changes of speed or course that are no full turn
+    manoeuvre_vertical_acceleration_mps2: float = 0.5
+    turn_acceleration_mps2: float = 1.0
+    turn_rate_rps: float = math.radians(3.0)
+    bank_rad: float = math.radians(25.0)  # slow aircraft turn faster: as a level turn at this bank
+    calm_share: float = 50.0
+    manoeuvre_share: float = 2.0
+    turn_share: float = 6.0  # both sides together
+    mode_lasts_s: float = 5.0  # mean time until the mode is drawn anew, by the shares
+
+
+@dataclass(frozen=True, slots=True)
 class DecisionPoint:
     """A named point on the approach, before the threshold."""
 
@@ -99,6 +118,7 @@ class Site:
     name: str
     runway: Runway
     position: PositionSource = PositionSource()
+    estimation: Estimation = Estimation()
     radars: tuple[RadarSite, ...] = ()
     decision_points: tuple[DecisionPoint, ...] = ()
     waypoints: tuple[Waypoint, ...] = ()

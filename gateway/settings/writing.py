@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 
-from gateway.settings.site import PositionSource, RadarSite, Runway, Site, Weather
+from gateway.settings.site import Estimation, PositionSource, RadarSite, Runway, Site, Weather
 
 
 def format_site(site: Site) -> str:
@@ -14,7 +14,7 @@ def format_site(site: Site) -> str:
     Angles are written to 1e-9 degrees (0.1 mm on the ground), lengths to 0.1 mm.
     """
     lines = [f"name = {_quoted(site.name)}", "", "[display]", f'units = "{site.units}"                # or "aviation"']
-    lines += ["", "[runway]", *_runway(site.runway), "", *_position(site.position)]
+    lines += ["", "[runway]", *_runway(site.runway), "", *_position(site.position), "", *_estimation(site.estimation)]
     for radar in site.radars:
         lines += ["", "[[radar]]", *_radar(radar)]
     for point in site.decision_points:
@@ -50,6 +50,43 @@ def _position(position: PositionSource) -> list[str]:
         f"systematic_m = {position.systematic_m:g}          # allowed constant error",
         f"velocity_sigma_mps = {position.velocity_sigma_mps:g}",
     ]
+
+
+def _estimation(chosen: Estimation) -> list[str]:
+    """What is as it is by default stands in comments, so that a site follows better defaults of a later release."""
+    usual = Estimation()
+    rows = (
+        ("calm_acceleration_mps2", chosen.calm_acceleration_mps2, usual.calm_acceleration_mps2, ""),
+        (
+            "manoeuvre_acceleration_mps2",
+            chosen.manoeuvre_acceleration_mps2,
+            usual.manoeuvre_acceleration_mps2,
+            "no full turn",
+        ),
+        (
+            "manoeuvre_vertical_acceleration_mps2",
+            chosen.manoeuvre_vertical_acceleration_mps2,
+            usual.manoeuvre_vertical_acceleration_mps2,
+            "",
+        ),
+        (
+            "turn_acceleration_mps2",
+            chosen.turn_acceleration_mps2,
+            usual.turn_acceleration_mps2,
+            "beside the turn's own",
+        ),
+        ("turn_rate_degps", math.degrees(chosen.turn_rate_rps), math.degrees(usual.turn_rate_rps), ""),
+        ("bank_deg", math.degrees(chosen.bank_rad), math.degrees(usual.bank_rad), "slow aircraft turn as at this bank"),
+        ("calm_share", chosen.calm_share, usual.calm_share, "of an aircraft's time, against the others"),
+        ("manoeuvre_share", chosen.manoeuvre_share, usual.manoeuvre_share, ""),
+        ("turn_share", chosen.turn_share, usual.turn_share, "both sides"),
+        ("mode_lasts_s", chosen.mode_lasts_s, usual.mode_lasts_s, ""),
+    )
+    lines = ["[estimation]                 # how aircraft fly, for --estimator imm and rmimm; nobody has to tune it"]
+    for key, value, default, says in rows:
+        line = f"{'# ' if value == default else ''}{key} = {value:.10g}"
+        lines.append(f"{line:<44s} # {says}" if says else line)
+    return lines
 
 
 def _radar(radar: RadarSite) -> list[str]:

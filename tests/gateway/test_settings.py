@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from gateway.settings import (
     DEMO_SITE,
     DecisionPoint,
+    Estimation,
     PositionSource,
     RadarSite,
     Runway,
@@ -316,3 +317,26 @@ def test_weather_alone_is_a_value() -> None:
     """An area as the program makes it is the one that the file describes."""
     area = Weather("storm", 31.0 * DEGREE, 104.0 * DEGREE, 5000.0)
     assert parse_site(format_site(replace(DEMO_SITE, weather=(area,)))).weather[0].radius_m == 5000.0
+
+
+def test_how_aircraft_fly_is_read_with_units() -> None:
+    """[estimation] is read key by key, degrees become radians, and what is left out stays as it is by default."""
+    site = parse_site(format_site(DEMO_SITE).replace("# bank_deg = 25", "bank_deg = 35"))
+    assert site.estimation == replace(Estimation(), bank_rad=math.radians(35.0))
+
+
+def test_how_aircraft_fly_is_written_where_it_is_not_as_by_default() -> None:
+    """Defaults are written as comments, so that they stay defaults; what was set is written and read again."""
+    assert "\n# mode_lasts_s = " in format_site(DEMO_SITE)
+    estimation = replace(Estimation(), mode_lasts_s=7.5, turn_rate_rps=math.radians(2.0))
+    text = format_site(replace(DEMO_SITE, estimation=estimation))
+    assert "\nmode_lasts_s = 7.5" in text
+    assert parse_site(text).estimation.mode_lasts_s == 7.5
+    assert parse_site(text).estimation.turn_rate_rps == pytest.approx(math.radians(2.0))
+
+
+def test_an_acceleration_in_another_unit_is_asked_for_in_metres() -> None:
+    """A wrong unit in [estimation] is one sentence that names the right key."""
+    text = format_site(DEMO_SITE).replace("[estimation]", "[estimation]\ncalm_acceleration_g = 0.1")
+    with pytest.raises(SiteError, match="calm_acceleration_mps2 here"):
+        parse_site(text)

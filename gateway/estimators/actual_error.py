@@ -1,0 +1,50 @@
+"""The covariance of the error that a filter of several modes makes, which is not the one that it reckons with.
+
+A mode's noise stands for manoeuvres, and the filter reckons with them all the time. An aircraft makes few: between them a
+filter's error is what the measurements' noise leaves, which is two thirds to three quarters of what it reckons with, and the
+mixture of modes that stay improbable adds to that. What is told to others is therefore carried beside the filter: the error
+goes through the same transitions and the gains that were really used (Joseph's form holds for any gain), with a share of the
+modes' noise only. What the modes disagree by is added where it is told.
+
+Arrays are over n tracks and m modes, as in `modes`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.estimators.kalman import ERROR, SIZE, Innovation
+
+Floats = NDArray[np.float64]
+
+MANOEUVRE_SHARE = 0.1  # of the modes' noise: how much of the manoeuvres that a filter is ready for takes place
+MOST = 2.0  # times what the filter reckons with: beyond it something else has bounded the filter's covariance
+
+_AXES = np.arange(SIZE)
+
+
+def carried_on(error: Floats, weight: Floats, carry: Floats, noise: Floats, share: float = MANOEUVRE_SHARE) -> Floats:
+    """Error covariances (n, 9, 9) later: transition and noise (n, m, 9, 9) of the modes, by their weights (n, m)."""
+    by_mode = weight[:, :, None, None]
+    moved: Floats = (by_mode * carry).sum(axis=1)
+    grown: Floats = (by_mode * noise).sum(axis=1)
+    told = share * grown
+    told[:, ERROR, ERROR] = grown[:, ERROR, ERROR]
+    return np.asarray(moved @ error @ moved.transpose(0, 2, 1) + told)
+
+
+def corrected(error: Floats, weight: Floats, told: Innovation, reckoned: Floats) -> Floats:
+    """Error covariances (n, 9, 9) after an update of n m rows, by the modes' weights (n, m) after it.
+
+    Never more than twice what the filter reckons with, (n, 9, 9): a guessed height, for one, bounds that without a gain.
+    """
+    n, m = weight.shape
+    gain = (weight[:, :, None, None] * told.gain.reshape(n, m, SIZE, -1)).sum(axis=1)
+    first = np.broadcast_to(told.sensitivity, (n * m, *told.sensitivity.shape[1:]))[::m]
+    kept = np.eye(SIZE) - gain @ first
+    noise = (gain * told.noise[::m, None, :]) @ gain.transpose(0, 2, 1)
+    after = kept @ error @ kept.transpose(0, 2, 1) + noise
+    after = 0.5 * (after + after.transpose(0, 2, 1))
+    out = (after[:, _AXES, _AXES] > MOST * reckoned[:, _AXES, _AXES]).any(axis=1)
+    return np.where(out[:, None, None], reckoned, after)
