@@ -35,6 +35,7 @@ AIRCRAFT, TARGET, BESIDE = "mavlink:1", (1, 3, 0), (1, 4, 0)
 BANDS_M = ((50_000.0, 25_000.0), (25_000.0, 10_000.0), (10_000.0, 1_200.0))
 COUNTED_FROM_S = 20.0
 WEIGHTINGS: tuple[Weighting, ...] = ("bias", "covariance", "innovation", "literal")
+LIGHT = "bias, alpha-beta-gamma"  # in place of the Kalman filter
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +66,13 @@ def run(runs: int = 200, seed: int = 1, *, rrd: Path | None = None, progress: Pr
     cases = {"with": case_003(runs, seed), "without": case_003(runs, seed, gps_error=False)}
     plan = [("radar alone", "with"), ("GPS alone", "with"), ("GPS alone", "without")]
     plan += [(weighting, error) for weighting in WEIGHTINGS for error in ("with", "without")]
+    plan += [(LIGHT, error) for error in ("with", "without")]
     for place, (method, error) in enumerate(plan):
         progress(f"{method}, {error} GPS error", place / (len(plan) + 5))
-        accuracy = measure_accuracy(cases[error], method)
+        light = method == LIGHT
+        accuracy = measure_accuracy(
+            cases[error], "bias" if light else method, "alpha-beta-gamma" if light else "kalman"
+        )
         rows.append((method, error, accuracy.overall_m, *accuracy.bands_m, accuracy.error_found_m))
         figures[f"{method} {error}"] = accuracy.overall_m
     for place, component in enumerate(("azimuth", "elevation", "range")):
