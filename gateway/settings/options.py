@@ -40,15 +40,11 @@ class Options:
     associate_at: int = 3  # hits in a row before a radar track and an aircraft are one
     association_wait_s: float = 1.0  # how long after a GPS report's validity plots may still bracket it
     history_s: float = 10.0  # later than this is too late
-    confirm_odds: float = (
-        1e4  # a track is confirmed when its measurements are so much likelier of one thing than of many
-    )
+    confirm_odds: float = 1e4  # a track is confirmed when its measurements are so much likelier of one thing
     coast_after_s: float = 2.0  # without an update for this long a track is coasting
     end_after_s: float = 30.0  # and for this long it ends
-    tentative_end_after_s: float = (
-        15.0  # or for this long, if it was never confirmed: three of the slowest usual reports
-    )
-    returns_within_s: float = 60.0  # an aircraft that is silent no longer than this comes back under its track's number
+    tentative_end_after_s: float = 15.0  # or for this long, if never confirmed: three of the slowest usual reports
+    returns_within_s: float = 300.0  # an aircraft that is silent no longer than this comes back under its track's number
     prediction_period_s: float = 1.0
     horizons_s: tuple[float, ...] = (10.0, 30.0, 60.0)
     begins_at: int | None = None  # stamp; what came before is heard for its clocks, plans and places, and not fused

@@ -378,9 +378,9 @@ def test_a_slow_source_does_not_coast_between_its_reports(world: Any) -> None:
 
 
 def test_an_ended_tracks_number_is_not_used_again(world: Any) -> None:
-    """An aircraft that comes back after its track ended gets a new one, with the next number."""
-    flight = world.flight(seconds=100.0, radars=())
-    flight = [one for one in flight if not world.at(12.0) < one.valid_at < world.at(80.0)]
+    """An aircraft that comes back long after its track ended gets a new one, with the next number."""
+    flight = world.flight(seconds=420.0, radars=())
+    flight = [one for one in flight if not world.at(12.0) < one.valid_at < world.at(400.0)]
     ran = world.run(flight)
     assert sorted({row["track"] for row in ran.rows()}) == [1, 2]
     assert {row["aircraft"] for row in ran.rows()} == {ONE}
