@@ -62,7 +62,7 @@ def heads_of(datagrams: Sequence[bytes]) -> Heads:
 
 def places_of(heads: Heads, which: Wanted) -> NDArray[np.bool_]:
     """Which of the heads are of a wanted message."""
-    return (heads != NO_HEAD) & which[np.maximum(heads, 0) >> 24]
+    return np.asarray((heads != NO_HEAD) & which[np.maximum(heads, 0) >> 24])
 
 
 def payload_of(datagram: bytes, message: int) -> bytes:

@@ -40,7 +40,8 @@ class Pairs:
     `radars`: (r, 3) latitude rad, longitude rad, height m. `which`: (n,) the radar of each pair. `polar`: (..., n, 3) range m,
     azimuth rad clockwise from north, elevation rad, with `polar_sigma` (n, 3). `geodetic`: (..., n, 3) longitude rad,
     latitude rad, height m, with `source_sigma_m` (n, 3) east, north, up. `velocity_mps`: (n, 3) earth-centred; needed only
-    for the radars' times.
+    for the radars' times. `aircraft`: (n,) which one a pair is of; needed only for their own errors. `level`: (r, 2) latitude
+    and longitude rad of the place whose horizon each radar is level with; None: its own.
     """
 
     radars: Floats
@@ -50,6 +51,8 @@ class Pairs:
     geodetic: Floats
     source_sigma_m: Floats
     velocity_mps: Floats | None = None
+    aircraft: Ints | None = None
+    level: Floats | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +83,11 @@ class Errors:
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """How the equations are weighted and solved. The default is what measures best; `LITERAL` is as printed."""
+    """How the equations are weighted and solved. The default is what measures best; `LITERAL` is as printed.
+
+    `own_sigma_m`: beside the source's error, which all aircraft share, each has one of its own of this size, an axis; it does
+    not become smaller the longer one flight is watched.
+    """
 
     system: System = "ecef"
     weighting: Weighting = "whitened"
@@ -88,6 +95,7 @@ class Method:
     prior_sigma_m: float | None = PRIOR_SIGMA_M
     robust: bool = True
     with_time: bool = False
+    own_sigma_m: float | None = None
 
 
 LITERAL = Method("ecef", "none", 1, None, robust=False)
@@ -104,6 +112,8 @@ def register(pairs: Pairs, method: Method = Method()) -> Errors:
         raise ValueError("registration needs at least two pairs")
     if method.with_time and pairs.velocity_mps is None:
         raise ValueError("a radar's time offset can only be found with velocities")
+    if method.own_sigma_m is not None and pairs.aircraft is None:
+        raise ValueError("own errors of aircraft can only be told apart where the pairs say whose they are")
     cases = pairs.polar.shape[:-2]
     radars = len(pairs.radars)
     each = 4 if method.with_time else 3
@@ -136,22 +146,49 @@ class _Solution:
 
 def _solve(pairs: Pairs, found: Floats, weight: Floats, method: Method) -> _Solution:
     """The next step from the errors found so far."""
-    rows, off = _equations(pairs, found, method)
-    root = np.sqrt(weight)[..., None]
-    rows, off = rows * root[..., None], off * root
-    size = rows.shape[-1]
-    table, known = rows.reshape(*rows.shape[:-3], -1, size), off.reshape(*off.shape[:-2], -1)
-    if method.prior_sigma_m is not None:
-        prior = np.zeros((*table.shape[:-2], 3, size))
-        prior[..., :, -3:] = np.eye(3) / (method.prior_sigma_m * per_metre(pairs.geodetic))[..., None, :]
-        table = np.concatenate([table, prior], axis=-2)
-        known = np.concatenate([known, -(prior @ found[..., None])[..., 0]], axis=-1)
+    table, known = _table(pairs, found, weight, method)
     solution = _least_squares(table, known)
     if method.weighting == "none":  # the equations do not say how good they are; their residuals do
         left = known - (table @ solution.step[..., None])[..., 0]
-        spread = (left * left).sum(axis=-1) / max(known.shape[-1] - size, 1)
+        spread = (left * left).sum(axis=-1) / max(known.shape[-1] - table.shape[-1], 1)
         return replace(solution, covariance=solution.covariance * spread[..., None, None])
     return solution
+
+
+def _table(pairs: Pairs, found: Floats, weight: Floats, method: Method) -> tuple[Floats, Floats]:
+    """All equations (..., m, p) and what they should give (..., m), the prior and aircraft's own errors worked in."""
+    rows, off = _equations(pairs, found, method)
+    root = np.sqrt(weight)[..., None]
+    rows, off = rows * root[..., None], off * root
+    size, cases = rows.shape[-1], rows.shape[:-3]
+    table, known = rows.reshape(*cases, -1, size), off.reshape(*cases, -1)
+    if method.own_sigma_m is not None:
+        table, known = _without_own(table, known, rows[..., -3:], pairs, method.own_sigma_m)
+    if method.prior_sigma_m is not None:
+        prior = np.zeros((*cases, 3, size))
+        prior[..., :, -3:] = np.eye(3) / (method.prior_sigma_m * per_metre(pairs.geodetic))[..., None, :]
+        table = np.concatenate([table, prior], axis=-2)
+        known = np.concatenate([known, -(prior @ found[..., None])[..., 0]], axis=-1)
+    return table, known
+
+
+def _without_own(
+    table: Floats, known: Floats, by_source: Floats, pairs: Pairs, sigma_m: float
+) -> tuple[Floats, Floats]:
+    """Equations without aircraft's own errors: three unknowns each, in sigmas about nothing, taken out by a turn (QR)."""
+    assert pairs.aircraft is not None
+    count = 3 * (int(pairs.aircraft.max()) + 1)
+    own = np.zeros((*by_source.shape[:-1], count))
+    scaled = by_source * (sigma_m * per_metre(pairs.geodetic))[..., None, None, :]
+    for one in range(count // 3):
+        mine = pairs.aircraft == one
+        own[..., mine, :, 3 * one : 3 * one + 3] = scaled[..., mine, :, :]
+    cases, size = table.shape[:-2], table.shape[-1]
+    above = np.concatenate([own.reshape(*cases, -1, count), table, known[..., None]], axis=-1)
+    below = np.broadcast_to(np.eye(count, count + size + 1), (*cases, count, count + size + 1))
+    triangle = np.asarray(np.linalg.qr(np.concatenate([above, below], axis=-2), mode="r"))
+    left = triangle[..., count:, count:]
+    return left[..., :-1], left[..., -1]
 
 
 def _least_squares(table: Floats, known: Floats) -> _Solution:
@@ -173,8 +210,8 @@ def _equations(pairs: Pairs, found: Floats, method: Method) -> tuple[Floats, Flo
     of_radar = found[..., :-3].reshape(*found.shape[:-1], radars, each)
     polar = pairs.polar + of_radar[..., pairs.which, :3]
     geodetic = pairs.geodetic + found[..., None, -3:]
-    place = pairs.radars[pairs.which]
-    made = difference(method.system, place, polar, geodetic)
+    level = pairs.radars[:, :2] if pairs.level is None else pairs.level
+    made = difference(method.system, pairs.radars[pairs.which], polar, geodetic, level[pairs.which])
     off = made.off
     rows = np.zeros((*off.shape, radars * each + 3))
     rows[..., -3:] = -made.by_source
@@ -204,7 +241,8 @@ def _spread(jacobian: Floats, sigma: Floats) -> Floats:
 
 def _weights(pairs: Pairs, found: Floats, method: Method) -> Floats:
     """Huber's: a pair counts by how far off it is, so that a wrong one pulls no more than one at the bound."""
-    _, off = _equations(pairs, found, replace(method, weighting="whitened"))
+    own = replace(pairs, source_sigma_m=np.hypot(pairs.source_sigma_m, method.own_sigma_m or 0.0))
+    _, off = _equations(own, found, replace(method, weighting="whitened"))
     distance = np.sqrt((off * off).sum(axis=-1))
     return np.where(distance > HUBER, HUBER / np.maximum(distance, HUBER), 1.0)
 
@@ -234,9 +272,9 @@ def _told(pairs: Pairs, found: Floats, weight: Floats, method: Method) -> Errors
 
 
 def _misfit(pairs: Pairs, found: Floats, weight: Floats, method: Method) -> Floats:
-    """The weighted sum of squares of the whitened residuals."""
-    _, off = _equations(pairs, found, replace(method, weighting="whitened"))
-    return np.asarray((weight * (off * off).sum(axis=-1)).sum(axis=-1))
+    """The weighted sum of squares of the whitened residuals, the prior's not among them."""
+    _, known = _table(pairs, found, weight, replace(method, weighting="whitened", prior_sigma_m=None))
+    return np.asarray((known * known).sum(axis=-1))
 
 
 def _against_prior(pairs: Pairs, found: Floats, weight: Floats, method: Method) -> Floats:

@@ -41,9 +41,15 @@ class Difference:
     by_ecef: Floats
 
 
-def difference(system: System, radar: Floats, polar: Floats, geodetic: Floats) -> Difference:
-    """Radars at `radar` (n, 3) latitude, longitude, height against geodetic (..., n, 3) longitude, latitude, height."""
-    turn = _ecef_from_local(radar[..., 1], radar[..., 0])
+def difference(
+    system: System, radar: Floats, polar: Floats, geodetic: Floats, level: Floats | None = None
+) -> Difference:
+    """Radars at `radar` (n, 3) latitude, longitude, height against geodetic (..., n, 3) longitude, latitude, height.
+
+    `level`: (n, 2) latitude and longitude of the place with whose horizon and north they are aligned; None: their own.
+    """
+    aligned = radar if level is None else level
+    turn = _ecef_from_local(aligned[..., 1], aligned[..., 0])
     origin = geodetic_to_ecef(radar[..., 0], radar[..., 1], radar[..., 2])
     local, by_polar = _local(polar)
     seen = origin + (turn @ local[..., None])[..., 0]

@@ -148,7 +148,8 @@ class ServedFeed:
             self._waiting.put_nowait(batch)
             self._kept = []
         except queue.Full:
-            self._kept = [entry for entry in batch if isinstance(entry, Always)][-KEPT_AT_MOST:]
+            always: list[Entry] = [entry for entry in batch if isinstance(entry, Always)]
+            self._kept = always[-KEPT_AT_MOST:]
             self.dropped += sum(len(entry.time) for entry in entries if not isinstance(entry, Always))
 
     def _run(self) -> None:

@@ -1,0 +1,292 @@
+"""Registration of a recording: pairs of what aircraft and radars said of one time, and the errors that explain them.
+
+A pair is an aircraft's report beside the plots of the radar track that it is associated with, brought to the report's time.
+At most one a second of each aircraft and radar counts: what comes more often has the same errors in it.
+Source: 004.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import insort
+from collections import deque
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.align import SECOND, Plot, bracket, place_plot, radar_from_status
+from gateway.estimators import running_registration as running
+from gateway.estimators.registration import LITERAL, Errors, Method, Pairs, register
+from gateway.estimators.registration_frames import System, per_metre
+from gateway.frames import RadarFrame, RunwayFrame, polar_from_xyz, polar_jacobian, turn
+from gateway.fuse.weighting import polar_difference
+from gateway.observation import GpsReport, RadarPlot, RadarStatus
+from gateway.picture import Picture
+from gateway.register import NO_CORRECTION
+from gateway.settings import RadarSite, Site
+
+Floats = NDArray[np.float64]
+
+WAIT_S = 3.0  # what a radar or an aircraft says later than this of a time is not waited for
+LEAST_PAIRS = 10
+SIGNIFICANT = 3.0
+PRIOR_CHI_SQUARE = 16.3  # three degrees of freedom, 99.9 %
+NAMES = ("range", "azimuth", "elevation", "time")
+UNITS = ("m", "degrees", "degrees", "ms")
+LIMITS = (15.0, math.radians(0.05), math.radians(0.05), 0.03)  # a larger sigma than this is worth no correction
+_PER_UNIT = (1.0, math.degrees(1.0), math.degrees(1.0), 1e3)
+_CLAIMED = ("measures {:.1f} m too far", "{:+.3f} degrees to the left", "{:+.3f} degrees too high", "{:+.0f} ms late")
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """One report beside one radar: geodetic (3,) latitude rad, longitude rad, height m; polar (3,) in the radar's own frame."""
+
+    at: int
+    aircraft: str
+    radar: int
+    geodetic: tuple[float, float, float]
+    sigma_m: tuple[float, float, float]  # east, north, up
+    velocity_enu_mps: tuple[float, float, float]  # of the runway's ENU; 0 where it is not told
+    polar: tuple[float, float, float]
+    polar_sigma: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class _Report:
+    at: int
+    aircraft: str
+    geodetic: tuple[float, float, float]
+    sigma_m: tuple[float, float, float]
+    velocity_enu_mps: tuple[float, float, float]
+
+
+@dataclass(slots=True)
+class Gathering:
+    """Pairs out of the pictures of a session in which nothing is taken off. Memory: the pairs, and seconds of the rest."""
+
+    site: Site
+    pairs: list[Pair] = field(default_factory=list)
+    radars: dict[int, RadarSite] = field(default_factory=dict)
+    _frame: RunwayFrame = field(init=False)
+    _plots: dict[str, deque[Plot]] = field(default_factory=dict)  # by radar track, in order of time
+    _reports: deque[_Report] = field(default_factory=deque)
+    _last: dict[tuple[str, int], int] = field(default_factory=dict)  # the second of the last pair
+
+    def __post_init__(self) -> None:
+        self._frame = RunwayFrame(self.site.runway)
+        self.radars = {radar.number: radar for radar in self.site.radars}
+
+    def take(self, picture: Picture) -> None:
+        """What one picture adds."""
+        reports = [one for one in picture.observations if isinstance(one, GpsReport)]
+        for place, report in enumerate(reports):
+            self._take_report(report, picture, place)
+        for one in picture.observations:
+            if isinstance(one, RadarStatus) and one.radar not in self.radars:
+                self.radars[one.radar] = radar_from_status(one, self._frame)
+            elif isinstance(one, RadarPlot) and one.track_number and one.radar in self.radars:
+                plot = place_plot(one, 0, self.radars[one.radar], NO_CORRECTION)
+                plots = self._plots.setdefault(f"{one.radar}/{one.track_number}", deque())
+                if plots and plots[-1].at > plot.at:
+                    ordered = list(plots)
+                    insort(ordered, plot, key=lambda one: one.at)
+                    plots.clear()
+                    plots.extend(ordered)
+                else:
+                    plots.append(plot)
+        due = picture.now - int(WAIT_S * SECOND)
+        while self._reports and self._reports[0].at <= due:
+            self._pair(self._reports.popleft(), picture)
+        self._forget(picture.now - int(3 * WAIT_S * SECOND))
+
+    def _take_report(self, report: GpsReport, picture: Picture, place: int) -> None:
+        """A report whose height was measured; its place is that which align gave it."""
+        if not picture.align.report_has_height[place]:
+            return
+        latitude, longitude, height = self._frame.geodetic_from_runway(picture.align.report_runway_m[place])
+        usual = self.site.position.sigma_m
+        level = report.horizontal_sigma_m or usual
+        upright = report.vertical_sigma_m or report.horizontal_sigma_m or usual
+        told = (report.velocity_east_mps, report.velocity_north_mps, report.velocity_up_mps)
+        local = np.array([math.nan if one is None else one for one in told])
+        axes = self._frame.local_from_enu(latitude, longitude)
+        east, north, up = turn(axes.T, local).tolist()
+        where = (float(latitude), float(longitude), float(height))
+        if math.isnan(east + north + up):
+            east = north = up = 0.0  # a report that does not tell how fast it flies tells nothing of times
+        made = _Report(report.valid_at, report.aircraft, where, (level, level, upright), (east, north, up))
+        insort(self._reports, made, key=lambda one: one.at)
+
+    def _pair(self, report: _Report, picture: Picture) -> None:
+        for aircraft, track in picture.associate.pairs:
+            radar = int(track.partition("/")[0])
+            if aircraft != report.aircraft or self._last.get((aircraft, radar)) == report.at // SECOND:
+                continue
+            polar, sigma = bracket(list(self._plots.get(track, ())), report.at, WAIT_S / 3, WAIT_S / 3)
+            if any(map(math.isnan, polar)):  # a place in space needs all three
+                continue
+            self._last[aircraft, radar] = report.at // SECOND
+            where, velocity = report.geodetic, report.velocity_enu_mps
+            self.pairs.append(Pair(report.at, aircraft, radar, where, report.sigma_m, velocity, polar, sigma))
+
+    def _forget(self, before: int) -> None:
+        for track in list(self._plots):
+            plots = self._plots[track]
+            while plots and plots[0].at < before:
+                plots.popleft()
+            if not plots:
+                del self._plots[track]
+        if len(self._last) > 10_000:
+            self._last = {key: second for key, second in self._last.items() if second * SECOND >= before}
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """One error of a radar: by how much it measures too much (azimuth to the left, time late; SI), and what that is worth."""
+
+    name: str
+    value: float
+    sigma: float
+    observable: bool
+
+    @property
+    def is_found(self) -> bool:
+        """Whether it is worth taking off."""
+        return self.is_told and abs(self.value) > SIGNIFICANT * self.sigma
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the geometry tells it well enough to be worth a correction."""
+        return self.observable and self.sigma <= LIMITS[NAMES.index(self.name)]
+
+    def sentence(self) -> str:
+        """In plain words."""
+        place = NAMES.index(self.name)
+        per = _PER_UNIT[place]
+        sigma = f"+- {per * self.sigma:.{(1, 3, 3, 0)[place]}f}"
+        if not self.is_told:
+            return f"{self.name}: not observable from this geometry ({sigma} {UNITS[place]}): not to be applied"
+        if not self.is_found:
+            return (
+                f"{self.name}: nothing significant ({per * self.value:+.{(1, 3, 3, 0)[place]}f} {sigma} {UNITS[place]})"
+            )
+        return f"{self.name}: {_CLAIMED[place].format(per * self.value)} ({sigma}): to be applied"
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What a recording tells of its radars: verdicts of each, and how good the whole is."""
+
+    radars: dict[int, tuple[Verdict, ...]]
+    source_m: tuple[float, float, float]  # by which all position sources say too much: east, north, up
+    source_sigma_m: tuple[float, float, float]
+    own_sigma_m: float
+    pairs: int
+    aircraft: tuple[str, ...]
+    condition: float
+    chi_square_per_freedom: float
+    prior_chi_square: float
+
+    @property
+    def is_prior_wrong(self) -> bool:
+        """Whether the position sources are further off together than was assumed; false where nothing was."""
+        return self.prior_chi_square > PRIOR_CHI_SQUARE
+
+
+def method_for(gathering: Gathering, system: System = "ecef", rounds: int = 2, *, literal: bool = False) -> Method:
+    """As printed; else whitened and robust, with the radars' times, and with own errors as large as the pairs show."""
+    if literal:
+        return replace(LITERAL, system=system, rounds=rounds)
+    own_m = own_errors_m(gathering) if gathering.pairs else None
+    return Method(system, rounds=rounds, with_time=True, own_sigma_m=own_m)
+
+
+def registered(gathering: Gathering, method: Method) -> Result | None:
+    """What the pairs tell; None where there are too few."""
+    if len(gathering.pairs) < LEAST_PAIRS:
+        return None
+    numbers = sorted({pair.radar for pair in gathering.pairs})
+    names = tuple(dict.fromkeys(pair.aircraft for pair in gathering.pairs))
+    pairs = _columns(gathering, numbers, names)
+    found = register(pairs, method)
+    verdicts = {number: _verdicts(found, place, method) for place, number in enumerate(numbers)}
+    return _result(found, pairs, verdicts, names, method)
+
+
+def _columns(gathering: Gathering, numbers: list[int], names: tuple[str, ...]) -> Pairs:
+    frame, rows = RunwayFrame(gathering.site.runway), gathering.pairs
+    sites = [gathering.radars[number] for number in numbers]
+    antennas = np.array([RadarFrame.of(site, frame).antenna_enu_m for site in sites])
+    radars = np.stack(frame.geodetic_from_enu(antennas), axis=-1)
+    which = np.array([numbers.index(pair.radar) for pair in rows], dtype=np.intp)
+    boresight = np.array([site.compass_boresight_rad for site in sites])[which]
+    polar = np.array([pair.polar for pair in rows])
+    polar[:, 1] = boresight - polar[:, 1]
+    geodetic = np.array([pair.geodetic for pair in rows])[:, [1, 0, 2]]
+    velocity = turn(frame.ecef_from_enu, np.array([pair.velocity_enu_mps for pair in rows]))
+    return Pairs(
+        radars,
+        which,
+        polar,
+        np.array([pair.polar_sigma for pair in rows]),
+        geodetic,
+        np.array([pair.sigma_m for pair in rows]),
+        velocity,
+        np.array([names.index(pair.aircraft) for pair in rows], dtype=np.intp),
+        np.broadcast_to([gathering.site.runway.latitude_rad, gathering.site.runway.longitude_rad], (len(numbers), 2)),
+    )
+
+
+def _verdicts(found: Errors, place: int, method: Method) -> tuple[Verdict, ...]:
+    """True = measured + error, and azimuth to the left: what a radar measures too much has the other sign, but for azimuth."""
+    each = 4 if method.with_time else 3
+    first = each * place
+    values = [-found.radar[place, 0], found.radar[place, 1], -found.radar[place, 2]]
+    if method.with_time:
+        values.append(-found.time_s[place])
+    return tuple(
+        Verdict(name, float(value), float(found.sigma[first + part]), bool(found.observable[first + part]))
+        for part, (name, value) in enumerate(zip(NAMES, values, strict=False))
+    )
+
+
+def _result(
+    found: Errors, pairs: Pairs, verdicts: dict[int, tuple[Verdict, ...]], names: tuple[str, ...], method: Method
+) -> Result:
+    per = per_metre(pairs.geodetic)
+    east, north, up = (-found.source / per).tolist()
+    sigma_e, sigma_n, sigma_u = (found.sigma[-3:] / per).tolist()
+    return Result(
+        radars=verdicts,
+        source_m=(east, north, up),
+        source_sigma_m=(sigma_e, sigma_n, sigma_u),
+        own_sigma_m=method.own_sigma_m or math.nan,
+        pairs=len(pairs.polar),
+        aircraft=names,
+        condition=float(found.condition),
+        chi_square_per_freedom=float(found.chi_square) / max(found.freedom, 1),
+        prior_chi_square=float(found.prior_chi_square),
+    )
+
+
+def own_errors_m(gathering: Gathering) -> float:
+    """How large the constant error of each aircraft's own position source is, an axis, by how they differ."""
+    frame = RunwayFrame(gathering.site.runway)
+    frames = {number: RadarFrame.of(site, frame) for number, site in gathering.radars.items()}
+    usual = gathering.site.position.systematic_m / math.sqrt(3.0)
+    rows = gathering.pairs
+    enu = frame.enu_from_geodetic(*np.array([pair.geodetic for pair in rows]).T)
+    turns = np.array([frames[pair.radar].radar_from_enu for pair in rows])
+    local = (turns @ (enu - np.array([frames[pair.radar].antenna_enu_m for pair in rows]))[..., None])[..., 0]
+    by_enu = polar_jacobian(local) @ turns
+    off = polar_difference(polar_from_xyz(local), np.array([pair.polar for pair in rows]))
+    noise = by_enu * np.array([pair.sigma_m for pair in rows])[:, None, :]
+    sigma = np.sqrt(np.array([pair.polar_sigma for pair in rows]) ** 2 + (noise * noise).sum(axis=-1))
+    rates = (by_enu @ np.array([pair.velocity_enu_mps for pair in rows])[..., None])[..., 0]
+    seen = running.Pairs([pair.aircraft for pair in rows], [pair.radar for pair in rows], off, sigma, by_enu, rates)
+    solution: running.Solution | None = None
+    for _ in range(2):  # the second time with less weight for what is far off
+        solution = running.solved(running.learnt(running.Evidence(), seen, solution), usual)
+    return usual if solution is None else solution.own_sigma_m
