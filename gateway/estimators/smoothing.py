@@ -37,6 +37,7 @@ Floats = NDArray[np.float64]
 
 AT_ONCE = 512  # instants x tracks whose transitions are worked out together: bounds memory
 LEAST_INFORMATION = 1e-9  # of the future, in units of what is predicted: less is rounding
+LEAST_SPREAD = 1e-13  # of a prediction in any direction, against its greatest
 LEAST_PAIR = 1e-12  # of a pair of modes, against the filter's own weight: none is ever impossible
 
 
@@ -144,7 +145,7 @@ def _pairs(before: States, elapsed_s: Floats, modes: Modes, size: int) -> _Pairs
     gain, rest, spread = _back(covariance, carry, np.broadcast_to(noise, (*shape, m, m, size, size)))
     ahead = (carry @ before.mean[:, :, None, :, :size, None])[..., 0]
     middle, joined = _joined(share, ahead, spread)
-    root = np.linalg.cholesky(_even(joined))
+    root = _root(joined)
     unit = np.linalg.solve(root, np.broadcast_to(np.eye(size), root.shape))
     one = unit[..., None, :, :]
     off = (one @ (ahead - middle[..., None, :])[..., None])[..., 0]
@@ -152,6 +153,13 @@ def _pairs(before: States, elapsed_s: Floats, modes: Modes, size: int) -> _Pairs
         log_share = np.log(share)
     inner = _even(one @ spread @ one.swapaxes(-1, -2))
     return _Pairs(middle, unit, log_share, off, inner, gain @ root[..., None, :, :], rest)
+
+
+def _root(covariance: Floats) -> Floats:
+    """The lower root of covariances, also of those that rounding has left a little less than positive."""
+    size = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
+    alike = _even(covariance) / (size[..., :, None] * size[..., None, :])
+    return np.asarray(size[..., None] * np.linalg.cholesky(alike + LEAST_SPREAD * np.eye(covariance.shape[-1])))
 
 
 def _joined(share: Floats, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
