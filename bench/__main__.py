@@ -12,6 +12,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from bench.estimation import estimation
+from bench.live_fleet import live_fleet
 from bench.live_rates import live_rates
 from bench.lively import core_share, lateness
 from bench.measure import Figure, load, machine
@@ -34,6 +36,8 @@ class Part(StrEnum):
     rates = "rates"
     pipeline = "pipeline"
     wires = "wires"
+    estimation = "estimation"
+    fleet = "fleet"
     hours = "hours"
 
 
@@ -86,6 +90,12 @@ def _measure(wanted: set[Part], runs: int, seconds: float, console: Console) -> 
         if Part.wires in wanted:
             say("a million MAVLink messages, beside pymavlink and mavlogfile")
             figures += wires(min(runs, 3))
+        if Part.estimation in wanted:
+            say("interacting models: ours, a textbook's loop and other libraries'")
+            figures += estimation(runs, say)
+        if Part.fleet in wanted:
+            say("100 vehicles with two radars, and 1000 aircraft, live")
+            figures += live_fleet(RATES_S)
         if Part.hours in wanted:
             figures += ten_hours(folder, say)
     return figures
