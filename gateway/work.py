@@ -305,17 +305,23 @@ class Work:
             self._work_in(*fuse.take_fix(self.lanes, fix, scene))
         for plot, key in tracked:
             lane = fuse.lane_of(self.lanes, plot, key, scene)
-            if lane is None and self._goes_on(key):
+            if lane is None and self._goes_on(key, plot.at):
                 scene = self._scene()
                 lane = fuse.lane_of(self.lanes, plot, key, scene)
             self._settle(lane)
             if not fuse.contains(self.lanes, lane, plot):  # a pair that changed just now may have taken it along
                 self._work_in(*fuse.take_plot(self.lanes, plot, key, scene))
 
-    def _goes_on(self, key: Key) -> bool:
+    def _goes_on(self, key: Key, at: int) -> bool:
         """Whether a new radar track goes on where another one fell silent; from now on it is that one's track."""
         self._settle()
         known, scene = self._spans, self._scene()
+        if (lanes := fuse.adopted_earlier(self.lanes, key, at)) is not None:
+            self.lanes = lanes
+            self.lanes, jobs = fuse.reroute(lanes, known, self._scene())
+            self.jobs = {job.track: job for job in jobs}
+            self._settle()
+            return True
         found = fuse.continued(self.lanes, key, scene, self.model)
         if found is None:
             return False

@@ -6,7 +6,7 @@ belong; `filtering` runs the filter over many tracks at once; `weighting` holds 
 against a radar; `rows` makes the result.
 """
 
-from gateway.fuse.continuing import continued, reviewed, spans_with, taken_on
+from gateway.fuse.continuing import adopted_earlier, continued, reviewed, spans_with, taken_on
 from gateway.fuse.lanes import Adopted, Ended, Lane, Lanes, contains, emptied, joined
 from gateway.fuse.life import LifeChange, end_silent, sentence, told
 from gateway.fuse.placing import Scene, lane_of, reroute, take_fix, take_plot
@@ -23,6 +23,7 @@ __all__ = [
     "Row",
     "Scene",
     "Settled",
+    "adopted_earlier",
     "coast",
     "contains",
     "continued",

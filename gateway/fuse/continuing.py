@@ -154,6 +154,14 @@ def reviewed(lanes: Lanes, pairs: Mapping[Key, str], tracks: RadarTracks, at: in
     return (replace(lanes, adopted=tuple(kept)) if kept or lanes.adopted else lanes), doubted
 
 
+def adopted_earlier(lanes: Lanes, key: Key, at: int) -> Lanes | None:
+    """The lanes where an adopted radar track begins earlier, because a plot from before came late; None = none does."""
+    if not any(one.key == key and at < one.since for one in lanes.adopted):
+        return None
+    adopted = (replace(one, since=at) if one.key == key and at < one.since else one for one in lanes.adopted)
+    return replace(lanes, adopted=tuple(adopted))
+
+
 def taken_on(lanes: Lanes, found: Continuation, scene: Scene) -> tuple[Lanes, Job | None]:
     """The lanes with a radar track going on as another one's: an aircraft's is adopted; what else is there goes on as it is.
 

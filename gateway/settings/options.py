@@ -44,7 +44,7 @@ class Options:
     coast_after_s: float = 2.0  # without an update for this long a track is coasting
     end_after_s: float = 30.0  # and for this long it ends
     tentative_end_after_s: float = 15.0  # or for this long, if never confirmed: three of the slowest usual reports
-    returns_within_s: float = 300.0  # an aircraft that is silent no longer than this comes back under its track's number
+    returns_within_s: float = 300.0  # an aircraft silent no longer than this comes back as its old track
     prediction_period_s: float = 1.0
     horizons_s: tuple[float, ...] = (10.0, 30.0, 60.0)
     begins_at: int | None = None  # stamp; what came before is heard for its clocks, plans and places, and not fused
