@@ -186,7 +186,7 @@ def stated(mixture: Mixture) -> Estimate:
 
     `combine` has the covariance that the filter reckons with.
     """
-    mean, spread = _matched(mixture.weight[:, :, None], mixture.mean, np.zeros((1, 1, SIZE, SIZE)))
+    mean, spread = _spread(mixture.weight[:, :, None], mixture.mean)
     return Estimate(mean[:, 0], mixture.error + spread[:, 0])
 
 
@@ -232,10 +232,18 @@ def held(mixture: Mixture, elapsed_s: Floats, modes: Modes) -> Estimate:
 
 def _matched(share: Floats, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
     """Means (n, j, 9) and covariances (n, j, 9, 9) of the Gaussians that match m ones in shares (n, m, j)."""
-    matched = share.transpose(0, 2, 1) @ mean
-    off = mean[:, :, None] - matched[:, None]
-    spread = covariance[:, :, None] + off[..., :, None] * off[..., None, :]
-    return matched, np.asarray((share[..., None, None] * spread).sum(axis=1))
+    matched, spread = _spread(share, mean)
+    n, m, j = share.shape
+    within = share.transpose(0, 2, 1) @ covariance.reshape(n, m, SIZE * SIZE)
+    return matched, np.asarray(spread + within.reshape(n, j, SIZE, SIZE))
+
+
+def _spread(share: Floats, mean: Floats) -> tuple[Floats, Floats]:
+    """Means (n, j, 9) of m ones in shares (n, m, j), and how they lie about these, (n, j, 9, 9)."""
+    across = share.transpose(0, 2, 1)
+    middle = across @ mean
+    off = (mean[:, None] - middle[:, :, None]) * np.sqrt(across)[..., None]
+    return middle, off.swapaxes(-1, -2) @ off
 
 
 def update(
