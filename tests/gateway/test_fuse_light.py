@@ -211,6 +211,36 @@ def test_without_a_height_the_vertical_is_left_alone(world: Any) -> None:
     assert np.abs(_errors(world, course, known)[-1, :2]).max() < 5.0  # the course swings a little
 
 
+@pytest.mark.parametrize("weighting", WEIGHTINGS)
+def test_whatever_comes_states_stay_numbers_and_covariances_positive(world: Any, weighting: Weighting) -> None:
+    """Outliers of 100 km, gaps of minutes, two measurements at one instant, anything missing, ten random sequences."""
+    there, model = world.two_radars, _model(world.two_radars, weighting)
+    for seed in range(10):
+        random, course, t, measures = np.random.default_rng(seed), there.Course(), 0.0, []
+        for k in range(40):
+            t += float(random.choice([0.0, 0.02, 0.4, 5.0, 90.0], p=[0.1, 0.2, 0.5, 0.15, 0.05]))
+            off = random.normal(0.0, 1.0, 3) * float(random.choice([10.0, 1e5], p=[0.9, 0.1]))
+            if k and random.random() < 0.6:
+                missing = "".join(letter for letter in "rae" if random.random() < 0.25)
+                plot = there.plot(course, t, serial=k, radar=int(random.integers(1, 3)), missing=missing)
+                measures.append(
+                    replace(plot, polar=tuple(value + o * 1e-4 for value, o in zip(plot.polar, off, strict=True)))
+                )
+            elif random.random() < 0.3:
+                speeds = tuple(random.choice([math.nan, 50.0], 3).tolist())
+                fix = there.fix(course, t, serial=k, off_m=off, sigma_m=np.array([15.0, 15.0, 300.0]))
+                measures.append(replace(fix, local=_local(there, course, t, bool(random.random() < 0.5), speeds)))
+            else:
+                measures.append(there.fix(course, t, serial=k, off_m=off, velocity_mps=_speed(there, course)))
+        near = (1, there.polar(course, 1.0), SIGMA)
+        for event in run([Job(1, None, sorted(measures, key=rank), lambda fix, near=near: near)], model)[0]:
+            claimed = event.covariance[:6, :6]
+            assert np.isfinite(event.mean).all()
+            scale = np.sqrt(np.diag(claimed))
+            assert np.linalg.eigvalsh(claimed / np.outer(scale, scale)).min() > -1e-9
+            assert not (event.restarted or "").startswith("its covariance")
+
+
 # the covariance, and what is coming -----------------------------------------------------------------------------------
 
 
