@@ -106,22 +106,23 @@ def check_due(state: Association, until: int, tracks: RadarTracks, setting: Sett
     """
     made: list[Check] = []
     spans, near = state.ledger.spans, Nearby(tracks)
-    checks, ledger, done = list(state.checks), state.ledger, 0
+    before, behind, ledger, done = state.checks, list[Check](), state.ledger, 0
     for fix in state.waiting:
         if fix.at > until or ledger.spans != spans:
             break
         done += 1
         compared = (fix, *compare(fix, near, setting))
-        if not checks or checks[-1].order < (fix.at, fix.aircraft):
-            place = len(checks)
-            tail = [compared]
-        else:
-            place, tail = _among(checks, compared)
-        ledger = checks[place].before if place < len(checks) else ledger
-        del checks[place:]
-        ledger = _fold(checks, ledger, tail, state, setting)
-        made += [check for check in checks[place:] if check.fix is fix]
-    return Association(ledger, tuple(checks), state.waiting[done:], state.chosen), made
+        last = behind[-1] if behind else before[-1] if before else None
+        if last is None or last.order < (fix.at, fix.aircraft):
+            ledger = _fold(behind, ledger, [compared], state, setting)
+            made.append(behind[-1])
+            continue
+        checks = (*before, *behind)
+        place, tail = _among(checks, compared)
+        before, behind = checks[:place], []
+        ledger = _fold(behind, checks[place].before if place < len(checks) else ledger, tail, state, setting)
+        made += [check for check in behind if check.fix is fix]
+    return Association(ledger, (*before, *behind), state.waiting[done:], state.chosen), made
 
 
 def _among(checks: Sequence[Check], compared: Compared) -> tuple[int, list[Compared]]:

@@ -108,7 +108,7 @@ def corrected(
 
 def _product(one: Floats, other: Floats) -> Floats:
     """Matrix products along the first two axes, (i, k, ...) by (k, j, ...)."""
-    found = one[:, 0, None] * other[0]
+    found: Floats = one[:, 0, None] * other[0]
     for k in range(1, len(other)):
         found += one[:, k, None] * other[k]
     return found
@@ -116,7 +116,7 @@ def _product(one: Floats, other: Floats) -> Floats:
 
 def _total(parts: Sequence[Floats] | Floats) -> Floats:
     """The sum of some arrays, in their order."""
-    found = parts[0] + parts[1] if len(parts) > 1 else parts[0].copy()
+    found: Floats = np.add(parts[0], parts[1]) if len(parts) > 1 else parts[0].copy()
     for part in parts[2:]:
         found += part
     return found
