@@ -70,14 +70,12 @@ class Pieces:
         self._now = 0
         self._taken_at = 0
         self._waiting = 0  # states that have settled
+        self._rows_waiting = 0
 
     @property
     def due(self) -> bool:
         """Whether it is time to take: enough has settled to be worth sorting what waits, or a minute has passed."""
-        return self._waiting >= max(ENOUGH, self._rows_waiting() // 4) or self._now - self._taken_at > TAKEN_EACH_NS
-
-    def _rows_waiting(self) -> int:
-        return sum(len(rows.time) for rows in self._rows)
+        return self._waiting >= max(ENOUGH, self._rows_waiting // 4) or self._now - self._taken_at > TAKEN_EACH_NS
 
     def add(self, fused: Fused, step: int, now: int) -> None:
         """Take a picture's rows and what has settled with it; its number and its time."""
@@ -85,6 +83,7 @@ class Pieces:
         if len(fused.time):
             self._rows.append(without_news(fused))
             self._steps.append(np.full(len(fused.time), step))
+            self._rows_waiting += len(fused.time)
         self.settle(fused.settled)
 
     def settle(self, settled: Sequence[Settled]) -> None:
@@ -121,6 +120,7 @@ class Pieces:
                 left.append(mine)
         kept = np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *left]))
         self._rows, self._steps = ([chosen(rows, kept)], [step[kept]]) if len(kept) else ([], [])
+        self._rows_waiting = len(kept)
         return pieces
 
     def _piece(self, past: _Past, rows: Fused, step: Ints, mine: Ints, *, with_tail: bool) -> tuple[list[Piece], Ints]:
