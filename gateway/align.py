@@ -21,6 +21,7 @@ from gateway.observation import GpsReport, RadarPlot, RadarStatus, Timing
 from gateway.settings import RadarSite, Site
 
 Floats = NDArray[np.float64]
+Correction = tuple[float, float, float, float]  # what is taken off: range m, azimuth rad, elevation rad, time s
 Polar = tuple[float, float, float]  # range m, azimuth rad, elevation rad; NaN = not measured
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
@@ -212,11 +213,12 @@ def _speed_mps(report: GpsReport) -> float:
     return math.hypot(report.velocity_east_mps, report.velocity_north_mps)
 
 
-def place_plot(plot: RadarPlot, serial: int, radar: RadarSite, correction: Floats) -> Plot:
-    """A plot with its radar's correction taken off and the site's sigmas where it gives none."""
+def place_plot(plot: RadarPlot, serial: int, radar: RadarSite, correction: Correction) -> Plot:
+    """A plot with its radar's errors taken off, and the site's sigmas where it gives none."""
     measured = (plot.range_m, plot.azimuth_rad, plot.elevation_rad)
+    *errors, late_s = correction
     distance, azimuth, elevation = (
-        math.nan if value is None else value - error for value, error in zip(measured, correction.tolist(), strict=True)
+        math.nan if value is None else value - error for value, error in zip(measured, errors, strict=True)
     )
     sigma = (
         plot.range_sigma_m or radar.range_sigma_m,
@@ -224,7 +226,8 @@ def place_plot(plot: RadarPlot, serial: int, radar: RadarSite, correction: Float
         plot.elevation_sigma_rad or radar.elevation_sigma_rad,
     )
     polar = (distance, azimuth, elevation)
-    return Plot(plot.valid_at, serial, plot.received_at, plot.radar, plot.track_number, polar, sigma)
+    at = plot.valid_at - round(late_s * SECOND)
+    return Plot(at, serial, plot.received_at, plot.radar, plot.track_number, polar, sigma)
 
 
 def radar_from_status(status: RadarStatus, frame: RunwayFrame) -> RadarSite:

@@ -1,41 +1,39 @@
-"""Register: the systematic errors of radars and position sources.
+"""Register: the systematic errors of radars, which the next align takes off.
 
-For now none is assumed and none is taken off; the correction travels the path all the same, so that align need not change.
+What the site file says of them is taken off; while a session runs nothing is learnt yet.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gateway.align import Correction
+from gateway.settings import RadarSite
 
-NO_CORRECTION: Floats = np.zeros(3)
-NO_CORRECTION.setflags(write=False)
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
 class Registered:
-    """What is taken off each radar's measurements: range m, azimuth rad, elevation rad; one row a radar."""
+    """What is taken off each radar's measurements: range m, azimuth rad, elevation rad, time s; one row a radar."""
 
     radars: tuple[int, ...]
-    correction: Floats  # (r, 3)
+    correction: Floats  # (r, 4)
 
 
 @dataclass(frozen=True, slots=True)
 class Registration:
-    """What is known of each radar's errors: range m, azimuth rad, elevation rad (3,); used by the next align."""
+    """What is known of the radars' errors; used by the next align."""
 
-    corrections: Mapping[int, Floats] = field(default_factory=dict)
-
-    def of(self, radar: int) -> Floats:
+    def of(self, radar: RadarSite) -> Correction:
         """What is taken off this radar's measurements."""
-        return self.corrections.get(radar, NO_CORRECTION)
+        return radar.range_error_m, radar.azimuth_error_rad, radar.elevation_error_rad, radar.time_error_s
 
-    def table(self, radars: Iterable[int]) -> Registered:
-        """The corrections of some radars as columns."""
+    def table(self, radars: Mapping[int, RadarSite]) -> Registered:
+        """What is taken off, as columns."""
         numbers = tuple(sorted(radars))
-        return Registered(numbers, np.array([self.of(number) for number in numbers]).reshape(-1, 3))
+        return Registered(numbers, np.array([self.of(radars[number]) for number in numbers]).reshape(-1, 4))

@@ -180,8 +180,7 @@ class Work:
                 f"counted, not used; add [[radar]] with number = {observation.radar} to the site file"
             )
             return None
-        correction = self.registration.of(observation.radar)
-        plot = align.place_plot(observation, self.serial, radar, correction)
+        plot = align.place_plot(observation, self.serial, radar, self.registration.of(radar))
         self.plots.append(plot)
         return None if observation.timing is Timing.FOREIGN else plot
 

@@ -34,6 +34,8 @@ Examples:
 
   talkdown register flight.tlog radar.pcap --site field.toml --json
 
+  talkdown register flight.tlog radar.pcap --site field.toml --write-site registered.toml
+
   talkdown register flight.tlog radar.pcap --site field.toml --literal --frame geodetic --iterations 2
 """
 
@@ -57,6 +59,15 @@ def find_errors(
     iterations: Annotated[
         int, typer.Option("--iterations", metavar="N", min=1, max=20, help="How often it is solved at least.")
     ] = 2,
+    write_site: Annotated[
+        Path | None,
+        typer.Option(
+            "--write-site",
+            metavar="FILE",
+            help="Write the site file with what was found, so that it is taken off from then on.",
+            show_default=False,
+        ),
+    ] = None,
     quiet: take.QuietOption = False,
     json: take.JsonOption = False,
 ) -> None:
@@ -64,10 +75,11 @@ def find_errors(
     from adapters.files import FileError
     from gateway.cli.progress import progressing
     from gateway.estimators.registration_frames import SYSTEMS
-    from gateway.offline.registration import LEAST_PAIRS, Gathering, method_for, registered
+    from gateway.offline.registration import LEAST_PAIRS, Gathering, method_for, registered, site_with
     from gateway.runtime.folder import FolderError
     from gateway.runtime.playback import open_playback
     from gateway.runtime.setup import RunFailure
+    from gateway.settings import format_site
 
     system = next((one for one in SYSTEMS if one == frame), None)
     if system is None:
@@ -94,7 +106,9 @@ def find_errors(
         )
     document = _document(result, method)
     if len(files) == 1 and files[0].is_dir():
-        _keep(files[0], document)
+        _write(files[0] / RESULT_FILE, text.dumps(document, indent=1) + "\n")
+    if write_site is not None:
+        _write(write_site, format_site(site_with(found.site, gathering.radars, result)))
     if json:
         print(text.dumps(document))
     elif not quiet:
@@ -138,10 +152,9 @@ def _document(result: Result, method: Method) -> dict[str, Any]:
     return {"radars": radars, **plain, "method": asdict(method)}
 
 
-def _keep(folder: Path, document: dict[str, Any]) -> None:
-    path = folder / RESULT_FILE
+def _write(path: Path, content: str) -> None:
     try:
-        path.write_text(text.dumps(document, indent=1) + "\n")
+        path.write_text(content)
     except OSError as error:
         raise RunError(f"{path} could not be written: {(error.strerror or str(error)).lower()}.") from error
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from bisect import insort
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -23,14 +24,14 @@ from gateway.frames import RadarFrame, RunwayFrame, polar_from_xyz, polar_jacobi
 from gateway.fuse.weighting import polar_difference
 from gateway.observation import GpsReport, RadarPlot, RadarStatus
 from gateway.picture import Picture
-from gateway.register import NO_CORRECTION
-from gateway.settings import RadarSite, Site
+from gateway.settings import RadarSite, Site, with_radar
 
 Floats = NDArray[np.float64]
 
 WAIT_S = 3.0  # what a radar or an aircraft says later than this of a time is not waited for
 LEAST_PAIRS = 10
 SIGNIFICANT = 3.0
+_NOTHING = (0.0, 0.0, 0.0, 0.0)
 PRIOR_CHI_SQUARE = 16.3  # three degrees of freedom, 99.9 %
 NAMES = ("range", "azimuth", "elevation", "time")
 UNITS = ("m", "degrees", "degrees", "ms")
@@ -87,7 +88,7 @@ class Gathering:
             if isinstance(one, RadarStatus) and one.radar not in self.radars:
                 self.radars[one.radar] = radar_from_status(one, self._frame)
             elif isinstance(one, RadarPlot) and one.track_number and one.radar in self.radars:
-                plot = place_plot(one, 0, self.radars[one.radar], NO_CORRECTION)
+                plot = place_plot(one, 0, self.radars[one.radar], _NOTHING)
                 plots = self._plots.setdefault(f"{one.radar}/{one.track_number}", deque())
                 if plots and plots[-1].at > plot.at:
                     ordered = list(plots)
@@ -213,6 +214,22 @@ def registered(gathering: Gathering, method: Method) -> Result | None:
     found = register(pairs, method)
     verdicts = {number: _verdicts(found, place, method) for place, number in enumerate(numbers)}
     return _result(found, pairs, verdicts, names, method)
+
+
+def site_with(site: Site, radars: Mapping[int, RadarSite], result: Result) -> Site:
+    """The site with what was found of its radars, to be taken off from now on; what was not found stays as it was."""
+    for number, verdicts in result.radars.items():
+        radar = radars[number]
+        found = {verdict.name: verdict.value for verdict in verdicts if verdict.is_found}
+        known = replace(
+            radar,
+            range_error_m=found.get("range", radar.range_error_m),
+            azimuth_error_rad=found.get("azimuth", radar.azimuth_error_rad),
+            elevation_error_rad=found.get("elevation", radar.elevation_error_rad),
+            time_error_s=found.get("time", radar.time_error_s),
+        )
+        site = with_radar(site, known) if found else site
+    return site
 
 
 def _columns(gathering: Gathering, numbers: list[int], names: tuple[str, ...]) -> Pairs:

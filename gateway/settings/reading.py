@@ -132,6 +132,10 @@ _TABLES: dict[str, _Table] = {
             "azimuth_sigma_deg": ("azimuth_sigma_rad", _number(1e-6, 45.0, scale=_RAD)),
             "elevation_sigma_deg": ("elevation_sigma_rad", _number(1e-6, 45.0, scale=_RAD)),
             "maximum_range_m": ("maximum_range_m", _POSITIVE),
+            "range_error_m": ("range_error_m", _number(-1e4, 1e4)),
+            "azimuth_error_deg": ("azimuth_error_rad", _number(-45.0, 45.0, scale=_RAD)),
+            "elevation_error_deg": ("elevation_error_rad", _number(-45.0, 45.0, scale=_RAD)),
+            "time_error_ms": ("time_error_s", _number(-10_000.0, 10_000.0, scale=1e-3)),
             "key_file": ("key_file", _text()),
         },
         required=("number", "along_m", "left_m", "antenna_height_m"),
@@ -256,8 +260,8 @@ def _kind(value: object) -> str:
 
 def _hint(key: str, known: list[str]) -> str:
     """What the writer may have meant: the same quantity in another unit, or a near spelling."""
-    stem = re.sub(r"_(deg|rad|m|km|ft|nm|mps|kn|mps2|degps|g)$", "", key)
-    same = [name for name in known if re.sub(r"_(deg|rad|m|mps|mps2|degps)$", "", name) == stem]
+    stem = re.sub(r"_(deg|rad|m|km|ft|nm|mps|kn|mps2|degps|g|s|ms)$", "", key)
+    same = [name for name in known if re.sub(r"_(deg|rad|m|mps|mps2|degps|s|ms)$", "", name) == stem]
     if same:
         return f"; it is {same[0]} here (the unit is part of the name)"
     from difflib import get_close_matches

@@ -48,7 +48,10 @@ class PositionSource:
 
 @dataclass(frozen=True, slots=True)
 class RadarSite:
-    """One radar's place in the runway frame and the noise of its measurements."""
+    """One radar's place in the runway frame, the noise of its measurements, and by how much it is known to measure too much.
+
+    The azimuth error is positive to the left, as the radar's azimuths are; its stamps are late by the time error.
+    """
 
     number: int
     along_m: float
@@ -60,6 +63,10 @@ class RadarSite:
     elevation_sigma_rad: float = math.radians(0.0573)
     maximum_range_m: float = 60000.0
     key_file: str | None = None
+    range_error_m: float = 0.0
+    azimuth_error_rad: float = 0.0
+    elevation_error_rad: float = 0.0
+    time_error_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

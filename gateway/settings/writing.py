@@ -101,6 +101,13 @@ def _radar(radar: RadarSite) -> list[str]:
         f"elevation_sigma_deg = {math.degrees(radar.elevation_sigma_rad):.6g}",
         f"maximum_range_m = {radar.maximum_range_m:g}",
     ]
+    errors = (
+        ("range_error_m", radar.range_error_m, "measures too far by"),
+        ("azimuth_error_deg", math.degrees(radar.azimuth_error_rad), "too far to the left by"),
+        ("elevation_error_deg", math.degrees(radar.elevation_error_rad), "too high by"),
+        ("time_error_ms", 1e3 * radar.time_error_s, "stamps late by"),
+    )
+    lines += [f"{f'{key} = {value:.6g}':<40s}# {says}" for key, value, says in errors if value]
     return [*lines, f"key_file = {_quoted(radar.key_file)}"] if radar.key_file else lines
 
 

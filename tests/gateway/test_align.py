@@ -290,13 +290,13 @@ def test_many_reports_have_the_bits_of_one(world: Any) -> None:
 
 
 def test_a_plot_has_the_correction_taken_off_and_its_own_sigmas_before_the_sites() -> None:
-    """What register learnt is subtracted; a sigma that the plot gives wins over the site's; what is missing stays so."""
+    """What a radar measures too much is subtracted, its lateness too; what is missing stays so."""
     said = RadarPlot(1, 3, T, T, 1000.0, None, 0.05, azimuth_sigma_rad=5e-4)
-    plot = place_plot(said, 7, DEMO_SITE.radars[0], np.array([10.0, 0.01, 0.02]))
+    plot = place_plot(said, 7, DEMO_SITE.radars[0], (10.0, 0.01, 0.02, 0.05))
     assert list(plot.polar) == pytest.approx([990.0, NAN, 0.03], nan_ok=True)
     site = DEMO_SITE.radars[0]
     assert list(plot.sigma) == [site.range_sigma_m, 5e-4, site.elevation_sigma_rad]
-    assert (plot.at, plot.serial, plot.radar, plot.number) == (T, 7, 1, 3)
+    assert (plot.at, plot.serial, plot.radar, plot.number) == (T - 50_000_000, 7, 1, 3)
 
 
 def test_raw_positions_are_drawn_where_they_are(world: Any) -> None:

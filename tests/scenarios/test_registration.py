@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from gateway.cli.app import run
+from gateway.settings import parse_site
 
 WRONG = ("range_error_m=150", "azimuth_error_deg=0.5", "elevation_error_deg=0.2")
 
@@ -46,6 +47,22 @@ def test_it_is_said_in_words(session: Path, capsys: pytest.CaptureFixture[str]) 
     assert "m too far" in told
     assert "to be applied" in told
     assert "pairs of" in told
+
+
+def test_what_was_found_goes_into_the_site_file_and_is_taken_off_from_then_on(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written = tmp_path / "registered.toml"
+    assert run(["register", str(session), "--write-site", str(written), "--quiet"]) == 0
+    (radar,) = parse_site(written.read_text()).radars
+    assert radar.range_error_m == pytest.approx(150.0, abs=15.0)
+    assert math.degrees(radar.azimuth_error_rad) == pytest.approx(0.5, abs=0.03)
+    assert radar.time_error_s == 0.0
+    off = {}
+    for name, words in (("before", []), ("after", ["--site", str(written)])):
+        assert run(["replay", str(session), *words, "--viewer", "none", "--json"]) == 0
+        off[name] = json.loads(capsys.readouterr().out)["accuracy"]["radar"]["rmse_m"]
+    assert off["after"] < 0.35 * off["before"]
 
 
 def test_as_printed_the_mixed_systems_fail_and_the_residuals_show_it(

@@ -95,11 +95,13 @@ class StageScene:
         told.append(("/track", counts, ("radar tracks", "plots of no track")))
         told.append(("/associate", (float(len(picture.associate.pairs)),), ("pairs",)))
         registered = picture.register
-        for radar, (range_m, azimuth, elevation) in zip(registered.radars, registered.correction.tolist(), strict=True):
+        for radar, off in zip(registered.radars, registered.correction.tolist(), strict=True):
+            range_m, azimuth, elevation, late_s = off
             title, length = f"radar {radar} range error, {self._units.length}", range_m * self._units.lengths
             told.append((entity("register", "radar", radar), (length,), (title,)))
             both = (f"radar {radar} azimuth error, degrees", f"radar {radar} elevation error, degrees")
             told.append((entity("register", "angle", radar), (math.degrees(azimuth), math.degrees(elevation)), both))
+            told.append((entity("register", "time", radar), (1e3 * late_s,), (f"radar {radar} late, ms",)))
         return [Sample(path, picture.now, picture.step, values, names) for path, values, names in told]
 
     def _ended(
