@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Literal
 
 from gateway import align, associate, fuse, predict, track
 from gateway.align import SECOND, Fix, Geoid, Plot
@@ -99,7 +100,7 @@ class Work:
                     Event(at, "info", f"radar track {track.name_of(key)}, {aircraft}, has fallen silent")
                 )
         self.association = associate.pruned(associate.forgotten(self.association, gone), before)
-        self.lanes, doubted = fuse.reviewed(self.lanes, self.association.ledger.pairs, self.tracks, at)
+        self.lanes, doubted = fuse.reviewed(self.lanes, self.association.ledger.spans, self.tracks, at)
         for one in doubted:
             text = f"radar track {track.name_of(one.key)} is {one.aircraft} no more: its reports do not find it there"
             self.events.append(Event(at, "info", text))
@@ -304,15 +305,17 @@ class Work:
             self._work_in(*fuse.take_fix(self.lanes, fix, scene))
         for plot, key in tracked:
             lane = fuse.lane_of(self.lanes, plot, key, scene)
-            if lane is None and self._goes_on(key, plot.at):
+            if lane is None and (goes_on := self._goes_on(key, plot.at)):
+                if goes_on == "not yet":
+                    continue
                 scene = self._scene()
                 lane = fuse.lane_of(self.lanes, plot, key, scene)
             self._settle(lane)
             if not fuse.contains(self.lanes, lane, plot):  # a pair that changed just now may have taken it along
                 self._work_in(*fuse.take_plot(self.lanes, plot, key, scene))
 
-    def _goes_on(self, key: Key, at: int) -> bool:
-        """Whether a new radar track goes on where another one fell silent; from now on it is that one's track."""
+    def _goes_on(self, key: Key, at: int) -> bool | Literal["not yet"]:
+        """Whether a new radar track goes on where another one fell silent; if so it is that one's track from now on."""
         self._settle()
         known, scene = self._spans, self._scene()
         if (lanes := fuse.adopted_earlier(self.lanes, key, at)) is not None:
@@ -324,6 +327,8 @@ class Work:
         found = fuse.continued(self.lanes, key, scene, self.model)
         if found is None:
             return False
+        if isinstance(found, str):
+            return found
         self.lanes, job = fuse.taken_on(self.lanes, found, scene)
         jobs = [job] if job is not None else []
         if found.lane.aircraft is not None:

@@ -10,8 +10,9 @@ has found the same, or GPS speaks against it), and a track that only a radar kno
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from gateway.align import SECOND, Plot
 from gateway.associate import Span, Spans, aircraft_of, ordinal_of
@@ -25,7 +26,10 @@ from gateway.track import Key, RadarTracks, name_of
 
 GATE_SIGMAS = 3.09  # one sided: of right ones, one in a thousand is refused
 PLAIN_ODDS = 100.0  # of the best explanation against each other one
-PLOTS = 5  # of a new radar track that are compared, at most
+PLOTS, LONG_ENOUGH_S = (
+    5,
+    2.0,
+)  # of a new radar track: so many are compared at most, so long a time at least if there are fewer
 DOUBTFUL_REPORTS = 15  # so many, and association has not found the same: then they speak against it
 
 
@@ -52,8 +56,11 @@ class _Fit:
     log_likelihood: float
 
 
-def continued(lanes: Lanes, key: Key, scene: Scene, model: Model) -> Continuation | None:
-    """The track that a radar track without one continues, or None while it has too few plots or nothing is plain."""
+def continued(lanes: Lanes, key: Key, scene: Scene, model: Model) -> Continuation | Literal["not yet"] | None:
+    """The track that a radar track without one continues, or None while it has too few plots or nothing is plain.
+
+    "not yet": it may be one, and some more plots will show whether it also flies like it.
+    """
     plots = scene.tracks.plots.get(key, ())
     if not begin(plots) or aircraft_of(scene.spans, key, plots[-1].at) is not None:
         return None
@@ -61,6 +68,8 @@ def continued(lanes: Lanes, key: Key, scene: Scene, model: Model) -> Continuatio
     near = [(fit.log_likelihood, lane, former) for lane, former, fit in fits if fit is not None and fit.within]
     if not near:
         return None
+    if len(plots) < PLOTS and plots[-1].at - plots[0].at < LONG_ENOUGH_S * SECOND:
+        return "not yet"
     best, lane, former = max(near, key=lambda one: (one[0], -one[1].track))
     others = [fit.log_likelihood for other, _, fit in fits if fit is not None and other is not lane]
     if any(other > best - math.log(PLAIN_ODDS) for other in others) or _has_rival(lane, key, scene, model):
@@ -137,21 +146,34 @@ def spans_with(spans: Spans, adopted: Sequence[Adopted]) -> Spans:
     return Spans(sorted((s for s in found if s.until is None or s.until > s.since), key=lambda span: span.since))
 
 
-def reviewed(lanes: Lanes, pairs: Mapping[Key, str], tracks: RadarTracks, at: int) -> tuple[Lanes, list[Adopted]]:
-    """The lanes without what was adopted and is gone; and what the aircraft's reports speak against, which ends now."""
+def reviewed(lanes: Lanes, spans: Spans, tracks: RadarTracks, at: int) -> tuple[Lanes, list[Adopted]]:
+    """The lanes without what was adopted and is no longer needed; and what GPS speaks against, which ends now.
+
+    `spans` are those that association has found.
+    """
     kept, doubted = [], []
     for one in lanes.adopted:
-        if one.key not in tracks.plots:
+        if one.key not in tracks.plots or _is_found(one, spans, tracks, lanes):
             continue
         lane = lanes.lanes.get(lanes.by_aircraft.get(one.aircraft, 0))
         gps_at = lane.last.gps_at if lane is not None and lane.events else one.gps_at
-        if one.until is None and one.key not in pairs and gps_at > one.gps_at:
+        if one.until is None and one.key not in spans.pairs and gps_at > one.gps_at:
             one = replace(one, gps_at=gps_at, reports=one.reports + 1)
             if one.reports >= DOUBTFUL_REPORTS:
                 one = replace(one, until=at)
                 doubted.append(one)
         kept.append(one)
-    return (replace(lanes, adopted=tuple(kept)) if kept or lanes.adopted else lanes), doubted
+    adopted = tuple(kept)
+    return (lanes if adopted == lanes.adopted else replace(lanes, adopted=adopted)), doubted
+
+
+def _is_found(one: Adopted, spans: Spans, tracks: RadarTracks, lanes: Lanes) -> bool:
+    """Whether association has found the same, and nothing that is remembered is from before it had."""
+    found = spans.by_key.get(one.key, ())
+    if not found or found[0].aircraft != one.aircraft or tracks.plots[one.key][0].at < found[0].since:
+        return False
+    is_old_held = any(span.until is None for span in spans if span.key == one.former)
+    return not is_old_held and not any(key == one.key for key, _ in lanes.by_key)
 
 
 def adopted_earlier(lanes: Lanes, key: Key, at: int) -> Lanes | None:

@@ -242,6 +242,8 @@ def test_a_radar_that_numbers_an_aircraft_anew_stays_in_its_track_at_once(world:
     assert {row["state"] for (_, at), row in rows.items() if at >= began} == {"fused"}
     assert len(ran.said("goes on as radar track 1/7, which was 1/3")) == 1
     assert len(ran.said("mavlink:1 is radar track 1/7")) == 1  # and association finds the same
+    assert not ran.state.lanes.adopted  # so that nothing of it is needed any more
+    assert rows[max(rows)]["radar_track"] == "1/7"
 
 
 @pytest.mark.parametrize("gap_s", [0.4, 5.0, 12.0, 20.0])

@@ -64,16 +64,16 @@ def steps(world: Any, visits: range, every_s: float) -> Iterator[list[Heard]]:
 
 
 def test_after_hours_of_coming_and_going_the_state_is_as_it_was_at_the_beginning(world: Any) -> None:
-    """Visitors come and go for three hours; an hour after the last one, every part of the state is as small as at first."""
+    """Visitors come and go for an hour and a half; an hour after the last one, every part of the state is as small as at first."""
     options = Options(prediction_period_s=30.0)
     first = pipeline.initial(world.site, options)
     state, _ = pipeline.step(first, [Heard(world.at(0.0))])
     began, busy = held(state), {}
-    for heard in steps(world, range(90), 120.0):
+    for heard in steps(world, range(45), 120.0):
         state, _ = pipeline.step(state, heard)
         busy = {name: max(size, busy.get(name, 0)) for name, size in held(state).items()}
-    assert state.lanes.next_track > 80
-    state, _ = pipeline.step(state, [Heard(world.at(90 * 120.0 + life.REMEMBERED_S + 60.0))])
+    assert state.lanes.next_track > 40
+    state, _ = pipeline.step(state, [Heard(world.at(45 * 120.0 + life.REMEMBERED_S + 60.0))])
     ended = held(state)
     for name in ("tracks", "association", "lanes"):
         assert busy[name] > 5 * began[name]
@@ -86,17 +86,17 @@ def test_aircraft_that_are_gone_are_remembered_in_a_bounded_number(world: Any, m
     """Of many that came and went the latest are remembered, and for an hour at most."""
     monkeypatch.setattr(life, "REMEMBERED", 10)
     state = pipeline.initial(world.site, Options(prediction_period_s=30.0))
-    for heard in steps(world, range(40), 20.0):
+    for heard in steps(world, range(25), 20.0):
         state, _ = pipeline.step(state, heard)
     assert 5 < len(state.lanes.gone) <= 10
-    assert all(one.event is None or one.ended_at > world.at(700.0) for one in state.lanes.gone.values())
-    state, _ = pipeline.step(state, [Heard(world.at(800.0 + 3700.0))])
+    assert all(one.event is None or one.ended_at > world.at(400.0) for one in state.lanes.gone.values())
+    state, _ = pipeline.step(state, [Heard(world.at(500.0 + 3700.0))])
     assert not state.lanes.gone
 
 
 def test_a_track_keeps_so_many_states_and_no_more(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """A source that says more in 10 s than is kept has a shorter history, in the same way whatever the ticks."""
-    said = world.flight(seconds=14.0, gps_period_s=0.1)
+    said = world.flight(seconds=7.0, gps_period_s=0.1)
     wanted = world.run(said)
     monkeypatch.setattr(lanes, "EVENTS_AT_MOST", 40)
     monkeypatch.setattr(track, "PLOTS_AT_MOST", 12)

@@ -1,6 +1,7 @@
 """Scores against the truth."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 
 from gateway.frames import RunwayFrame
 from gateway.observation import Truth
+from gateway.runtime import accuracy
 from gateway.runtime.accuracy import Accuracy
 from gateway.settings import DEMO_SITE
 
@@ -98,3 +100,33 @@ def test_without_truth_there_are_no_scores() -> None:
     accuracy = Accuracy(RUNWAY)
     accuracy.add(picture(START, [], [(START, path_m(START))]))
     assert accuracy.scores() == {}
+
+
+def test_a_long_session_keeps_some_errors_of_all_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 2000 errors of 1 to 2000 m a hundred at most are kept: count and root mean square are exact, quantiles near."""
+    scores = []
+    for most in (100_000, 100):
+        monkeypatch.setattr(accuracy, "_KEPT_AT_MOST", most)
+        told = Accuracy(RUNWAY)
+        for second in range(2000):
+            at = START + second * SECOND
+            off = np.array([0.0, second + 1.0, 0.0])
+            told.add(picture(at, [truth(at, msl=False)], [(at, path_m(at) + off)]))
+        (score,) = told.scores().values()
+        scores.append(score)
+    exact, thinned = scores
+    assert len(told._errors["gps"].kept) <= 100
+    assert exact.count == thinned.count == 2000
+    assert thinned.rmse_m == pytest.approx(exact.rmse_m, rel=1e-6)
+    # every 32nd of 2000 is kept: a quantile is known to that many metres
+    assert thinned.median_m == pytest.approx(exact.median_m, abs=32.0)
+    assert thinned.p95_m == pytest.approx(exact.p95_m, abs=32.0)
+
+
+def test_the_truth_of_those_who_are_gone_is_forgotten() -> None:
+    told = Accuracy(RUNWAY)
+    for second in range(100):
+        at = START + second * SECOND
+        said = replace(truth(at, msl=False), aircraft=f"mavlink:{second}")
+        told.add(picture(at, [said], []))
+    assert len(told._truths) < 70
