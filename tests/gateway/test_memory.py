@@ -18,13 +18,12 @@ from gateway.settings import Options
 from gateway.state import State
 
 
+APART = ("site", "options", "frame", "radars", "consistency")  # settings, and what is bounded by its number of sources
+
+
 def held(state: State) -> dict[str, int]:
-    """Bytes of what each part of the state holds, all the way down; of the sites and options nothing."""
-    sizes = {}
-    for name in State.__dataclass_fields__:
-        if name not in ("site", "options", "frame", "radars"):
-            sizes[name] = _deep_size(getattr(state, name))
-    return sizes
+    """Bytes of what each part of the state holds, all the way down."""
+    return {name: _deep_size(getattr(state, name)) for name in State.__dataclass_fields__ if name not in APART}
 
 
 def _deep_size(root: object) -> int:
