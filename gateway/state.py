@@ -9,6 +9,7 @@ from gateway.align import Geoid
 from gateway.associate import Association, Change
 from gateway.frames import RunwayFrame
 from gateway.fuse import Lanes
+from gateway.fuse.consistency import Consistency
 from gateway.register import Registration
 from gateway.settings import Options, RadarSite, Site
 from gateway.track import RadarTracks
@@ -34,6 +35,7 @@ class State:
     counters: Mapping[str, int] = field(default_factory=dict)
     said: frozenset[str] = frozenset()  # what is said once
     reported: frozenset[Change] = frozenset()  # pairs made and lost, lately
+    consistency: Consistency = Consistency()  # whether sources scatter as much as the settings say
 
 
 def initial(site: Site, options: Options = Options()) -> State:

@@ -38,6 +38,7 @@ class Work:
         self.association, self.registration, self.lanes = state.association, state.registration, state.lanes
         self.now, self.instant, self.serial = state.now, state.instant, state.serial
         self.counters, self.said, self.reported = dict(state.counters), state.said, state.reported
+        self.consistency = state.consistency
         self.history = int(state.options.history_s * SECOND)
         self.wait = int(state.options.association_wait_s * SECOND)
         self._see_radars()
@@ -76,8 +77,11 @@ class Work:
         self.events += [Event(now, level, text) for level, text in arrival.notes]
 
     def _whole_second(self, at: int) -> None:
-        """Ends, coasting, predictions, and forgetting what is older than the history."""
+        """Ends, coasting, predictions, what scatters otherwise than stated, and forgetting what is older than the history."""
         self._settle()
+        self.consistency, findings = self.consistency.judged(self.site.position, self.radars)
+        for found in findings:
+            self.once(found.text, topic=found.topic)
         lanes, ended = fuse.end_silent(self.lanes, at, self.options)
         self.ended += ended
         self.events += [Event(at, "info", f"track {end.track} ended: {end.reason}") for end in ended if not end.quiet]
@@ -355,6 +359,7 @@ class Work:
         separation_m = self.geoid.separation_m
         self.lanes, rows, fresh = fuse.work(self.lanes, jobs, self._spans, separation_m, self.model)
         self.rows += rows
+        self.consistency = self.consistency.hearing(event for _, event in fresh)
         outliers = sum(event.outlying for _, event in fresh)
         if outliers:
             self.count("outliers, their pull bounded", outliers)
@@ -414,6 +419,7 @@ class Work:
             self.counters,
             self.said,
             self.reported,
+            self.consistency,
         )
         observations = tuple(observation for arrival in self.heard for observation in arrival.observations)
         own = SourceHealth("gateway", "pipeline", 0.0, 0.0, 0, tuple(sorted(self.counters.items())))

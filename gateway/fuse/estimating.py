@@ -56,6 +56,7 @@ class Advanced:
     memory: Floats
     outlying: Bools  # (n,) so far out that the pull was bounded
     far: Bools  # (n,) so far out that a filter in order hardly ever sees it
+    residual: tuple[Floats, Floats] | None = None  # (n, k): innovations, and by what they should scatter by
 
 
 class Estimator(Protocol):
@@ -93,7 +94,10 @@ class SingleModel:
         state = predict(state, group.elapsed_s, self.model.motion)
         after, told, memory = _update(group, state, group.measures, group.near, group.memory, self.model)
         far = told.normalised > FAR_SIGMA**2 * np.maximum(told.measured.sum(axis=1), 1)
-        return Advanced(after, (None,) * len(before), memory, told.outlying, far)
+        residual = None
+        if group.kind != "literal":
+            residual = _residual(told.innovation, told.covariance, told.measured)
+        return Advanced(after, (None,) * len(before), memory, told.outlying, far, residual)
 
     def ahead(self, events: Sequence[Event], elapsed_s: Floats, *, far: bool) -> tuple[Estimate, Floats]:
         """See `Estimator`."""
@@ -134,7 +138,10 @@ class InteractingModels:
         nearest = each.normalised.reshape(n, m).min(axis=1)
         far = nearest > FAR_SIGMA**2 * np.maximum(each.measured.reshape(n, m, -1)[:, 0].sum(axis=1), 1)
         beliefs = [mixtures.row(i) for i in range(n)]
-        return Advanced(modes.stated(mixtures), beliefs, known, told.outlying, far)
+        residual = None
+        if group.kind != "literal":  # a weight of a single residual squared leaves nothing to judge it by
+            residual = _residual(told.innovation, told.scatter, each.measured[::m])
+        return Advanced(modes.stated(mixtures), beliefs, known, told.outlying, far, residual)
 
     def ahead(self, events: Sequence[Event], elapsed_s: Floats, *, far: bool) -> tuple[Estimate, Floats]:
         """See `Estimator`. Far ahead the likeliest mode is kept."""
@@ -153,6 +160,13 @@ class InteractingModels:
 
 def _mixtures(events: Sequence[Event]) -> Mixture:
     return modes.stacked([event.mixture for event in events if event.mixture is not None])
+
+
+def _residual(innovation: Floats, scatter: Floats, measured: Bools) -> tuple[Floats, Floats]:
+    """Innovations (n, k), and the same by the roots of the diagonal of (n, k, k); NaN = not measured."""
+    known = np.where(measured, innovation, np.nan)
+    along = np.arange(innovation.shape[1])
+    return known, known / np.sqrt(scatter[:, along, along])
 
 
 def stacked(rows: Sequence[Floats]) -> Floats:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,28 @@ Neighbour = Callable[[Fix], Near | None]  # what a track's radar measured at a r
 Belief = Mixture | Floats | None  # what an estimator keeps of a track beside mean and covariance, of one track
 
 NEVER = -(1 << 62)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Residual:
+    """How far a measurement's k components were from where they were expected, (k,) each, NaN = not measured."""
+
+    innovation: Floats  # metres, m/s, or radians
+    by_scatter: Floats  # in units of what it should scatter by
+    change: Floats  # of `innovation` since the last measurement of this source, by sqrt 2; NaN where there is none
+    change_by_scatter: Floats
+
+    @classmethod
+    def after(cls, before: Residual | None, innovation: Floats, by_scatter: Floats) -> Residual:
+        """The residual that follows another one of the same source, or none."""
+        if before is None:
+            unknown = np.full_like(innovation, np.nan)
+            return cls(innovation, by_scatter, unknown, unknown)
+        change, by_scatter_too = innovation - before.innovation, by_scatter - before.by_scatter
+        return cls(innovation, by_scatter, _HALF_ROOT * change, _HALF_ROOT * by_scatter_too)
+
+
+_HALF_ROOT = math.sqrt(0.5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,6 +63,9 @@ class Event:
     far_since: int = NEVER  # when the last one before them was valid
     restarted: str | None = None  # why the filter began anew with this measurement; None = it went on
     score: float = 0.0  # how much speaks for one thing that flies (agreement.py); infinite = confirmed
+
+    residual: Residual | None = None  # None: of the first measurement, and of an estimator that does not tell
+    latest: Mapping[int, Residual] = field(default_factory=dict)  # of each radar, this one included; 0 = of reports
 
     @property
     def at(self) -> int:

@@ -13,7 +13,7 @@ from gateway.estimators.kalman import Estimate
 from gateway.fuse.agreement import score_after
 from gateway.fuse.diverging import can_begin, far_row, is_sound, may_be_lost, why
 from gateway.fuse.estimating import Estimator, Group, InteractingModels, SingleModel, stacked
-from gateway.fuse.events import NEVER, Belief, Event, Job, Measure, Near, Neighbour, rank
+from gateway.fuse.events import NEVER, Belief, Event, Job, Measure, Near, Neighbour, Residual, rank
 from gateway.fuse.light import LightFilter
 from gateway.fuse.weighting import Model
 
@@ -85,11 +85,14 @@ def _advance(
             after = estimator.advance(before, Group(kind, radar, chosen, seen, elapsed_s, memory))
         all_sound = is_sound(after.state)
         states = zip(after.state.mean, after.state.covariance, after.memory, after.beliefs, strict=True)
-        told = zip(after.outlying.tolist(), after.far.tolist(), strict=True)
-        for row, base, measure, state, (outlying, far) in zip(rows, before, chosen, states, told, strict=True):
+        residuals = [None] * len(before) if after.residual is None else list(zip(*after.residual, strict=True))
+        told = zip(after.outlying.tolist(), after.far.tolist(), residuals, strict=True)
+        for row, base, measure, state, (outlying, far, residual) in zip(
+            rows, before, chosen, states, told, strict=True
+        ):
             far_off, far_since = far_row(base) if far else (0, NEVER)
             score = score_after(base, measure, model)
-            event = _event(measure, *state, base, outlying, score, far_off, far_since)
+            event = _event(measure, *state, base, outlying, score, far_off, far_since, residual)
             lost = (far_off and may_be_lost(event)) or not all_sound
             events[row] = _begun_again(event, estimator) if lost else event
     return [events[row] for row in range(len(measures))]
@@ -114,6 +117,8 @@ def _begun_again(event: Event, estimator: Estimator) -> Event:
         far_off=0,
         far_since=NEVER,
         restarted=reason,
+        residual=None,
+        latest={},
     )
 
 
@@ -137,6 +142,7 @@ def _event(
     score: float = 0.0,
     far_off: int = 0,
     far_since: int = NEVER,
+    residual: tuple[Floats, Floats] | None = None,
 ) -> Event:
     gps_at, radar_at, height_at = (base.gps_at, base.radar_at, base.height_at) if base else (NEVER, NEVER, NEVER)
     barometric, callsign = (base.barometric, base.callsign) if base else (None, None)
@@ -151,6 +157,10 @@ def _event(
         height_at = measure.at
     # The longest recent interval, forgotten slowly: tells a source of one report each 5 s from one that fell silent.
     interval = max(measure.at - base.at, base.interval - base.interval // 8) if base else 0
+    source, latest, told = measure.radar if isinstance(measure, Plot) else 0, base.latest if base else {}, None
+    if residual is not None:
+        told = Residual.after(latest.get(source), *residual)
+        latest = {**latest, source: told}
     return Event(
         measure,
         mean,
@@ -167,4 +177,6 @@ def _event(
         far_off,
         far_since,
         score=score,
+        residual=told,
+        latest=latest,
     )

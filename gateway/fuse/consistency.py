@@ -1,0 +1,172 @@
+"""Whether sources scatter as much as the settings say: a running test of what the filter did not expect.
+
+Looked at are changes from one innovation to the next of the same track and source, over the last thousand or so of each
+source and component. A filter that lags behind a manoeuvre, and a source with a constant error, are wrong in the same way for
+seconds: changes do not see that, noise they do.
+
+too small   they are larger than innovations should scatter by (S), each bounded: a turn's first second is a large change
+too large   they are smaller than the stated noise alone (R). However a target moves and whatever the filter thinks, a change
+            holds the noise of both measurements: only noise that is less than stated makes it small
+
+What a stream says of its own accuracy is only held against the first: a receiver's error that lasts is part of that, and the
+track follows it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.align import Fix, Plot
+from gateway.fuse.events import Event, Measure, Residual
+from gateway.settings import PositionSource, RadarSite
+
+Floats = NDArray[np.float64]
+
+MEMORY = 1000.0  # measurements: older ones fade
+LEAST = 60.0  # measurements before anything is said
+# Standard deviations, so that among thousands of sources none is suspected by chance; the lower end of chi-square is the
+# steeper one, and an honest source is some way above it.
+SURE_TOO_SMALL, SURE_TOO_LARGE = 4.0, 3.0
+TOO_SMALL, TOO_LARGE = 1.3, 0.72  # of squares: what a model of motion is off by is not the noise's fault
+MOST, BOUNDED_MEAN = 4.0, 0.9205  # of squares, and the mean of a square of unit variance that is bounded so
+SOURCES_AT_MOST = 4096  # the least lately heard are forgotten
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Which components of a measurement share one noise, and where that is set: a key in a table of the site file."""
+
+    name: str
+    first: int
+    last: int
+    key: str
+    unit: str
+    per_unit: float = 1.0  # of what is inside for one in the file
+
+
+REPORT = (
+    Part("position", 0, 3, "sigma_m", "m"),
+    Part("velocity", 3, 6, "velocity_sigma_mps", "m/s"),
+)
+PLOT = (
+    Part("range", 0, 1, "range_sigma_m", "m"),
+    Part("azimuth", 1, 2, "azimuth_sigma_deg", "degrees", math.pi / 180.0),
+    Part("elevation", 2, 3, "elevation_sigma_deg", "degrees", math.pi / 180.0),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Sums:
+    """Faded sums over the changes of one component, by sqrt 2: how many, and their squares."""
+
+    count: float = 0.0
+    by_scatter: float = 0.0  # of innovations by what they should scatter by
+    bounded: float = 0.0  # the same with each square at most MOST, by what that makes of a mean of 1
+    by_noise: float = 0.0  # of innovations by the stated noise
+
+    def then(self, residual: Residual, some: slice, sigma: float) -> Sums:
+        """The same after some components of a measurement whose noise is stated as `sigma`."""
+        by_scatter, by_noise = _squares(residual.change_by_scatter[some]), _squares(residual.change[some] / sigma)
+        bounded = math.fsum(min(square, MOST) for square in by_scatter) / BOUNDED_MEAN
+        keep = 1.0 - len(by_scatter) / MEMORY
+        return Sums(
+            keep * self.count + len(by_scatter),
+            keep * self.by_scatter + math.fsum(by_scatter),
+            keep * self.bounded + bounded,
+            keep * self.by_noise + math.fsum(by_noise),
+        )
+
+    @property
+    def factor(self) -> float | None:
+        """How many times as much as stated it scatters, once that is sure; None = as stated, as far as can be told."""
+        if self.count < LEAST:
+            return None
+        chance = math.sqrt(3.0 / self.count)  # changes that follow each other share a measurement
+        if self.bounded / self.count > max(TOO_SMALL, 1.0 + SURE_TOO_SMALL * chance):
+            return math.sqrt(self.by_scatter / self.count)
+        if self.by_noise / self.count < min(TOO_LARGE, 1.0 - SURE_TOO_LARGE * chance):
+            return math.sqrt(min(self.by_scatter, self.by_noise) / self.count)
+        return None
+
+
+def _squares(values: Floats) -> list[float]:
+    """The squares of those values that are known."""
+    return [value * value for value in values.tolist() if value == value]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A source that is inconsistent with its settings: what is said of it, and under which heading it is said once."""
+
+    topic: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Consistency:
+    """What is known of each source and component, the least lately heard first; and the measurements of the last second."""
+
+    sums: Mapping[tuple[str, str, bool], Sums] = field(
+        default_factory=dict
+    )  # source, part, whether the site file sets it
+    waiting: tuple[Event, ...] = ()
+
+    def hearing(self, events: Iterable[Event]) -> Consistency:
+        """The same with new measurements waiting to be judged."""
+        return Consistency(self.sums, (*self.waiting, *(event for event in events if event.residual is not None)))
+
+    def judged(self, position: PositionSource, radars: Mapping[int, RadarSite]) -> tuple[Consistency, list[Finding]]:
+        """The same with what waited worked in, in order of arrival, and what is sure by now."""
+        sums, findings = dict(self.sums), []
+        for event in sorted(self.waiting, key=lambda event: event.measure.serial):
+            assert event.residual is not None
+            source, sigma = _source_of(event.measure)
+            for part, usual in _parts(event.measure, position, radars):
+                some = slice(part.first, part.last)
+                stated = float(sigma[part.first])
+                key = source, part.name, usual is not None and math.isclose(stated, usual, rel_tol=1e-9)
+                sums[key] = sums.pop(key, Sums()).then(event.residual, some, stated)
+                factor = sums[key].factor
+                if factor is not None and (key[2] or factor > 1.0):
+                    findings.append(_finding(event.measure, source, part, stated, factor, key[2]))
+        while len(sums) > SOURCES_AT_MOST:
+            del sums[next(iter(sums))]
+        return Consistency(sums), findings
+
+
+def _source_of(measure: Measure) -> tuple[str, Floats]:
+    """The source's name and the stated sigma of each component."""
+    if isinstance(measure, Plot):
+        return f"radar {measure.radar}", np.array(measure.sigma)
+    return f"GPS of {measure.aircraft}", np.concatenate([measure.sigma_m, np.full(3, measure.velocity_sigma_mps)])
+
+
+def _parts(
+    measure: Measure, position: PositionSource, radars: Mapping[int, RadarSite]
+) -> list[tuple[Part, float | None]]:
+    """A measurement's parts, each with the sigma that the site file sets."""
+    if isinstance(measure, Fix):
+        return list(zip(REPORT, (position.sigma_m, position.velocity_sigma_mps), strict=True))
+    radar = radars.get(measure.radar)
+    said: tuple[float | None, ...] = (None,) * 3
+    if radar is not None:
+        said = (radar.range_sigma_m, radar.azimuth_sigma_rad, radar.elevation_sigma_rad)
+    return list(zip(PLOT, said, strict=True))
+
+
+def _finding(measure: Measure, source: str, part: Part, sigma: float, factor: float, is_set: bool) -> Finding:
+    topic = f"scatter of {part.name}, {source}"
+    text = f"{source}: its {part.name} scatters {factor:.2g} times as much as "
+    stated = sigma / part.per_unit
+    if not is_set:
+        return Finding(
+            topic, f"{text}its stream says ({stated:.3g} {part.unit}): tracks are less sure than they are told to be"
+        )
+    table = f"the [[radar]] number {measure.radar}" if isinstance(measure, Plot) else "[position]"
+    text += f"its stated {stated:.3g} {part.unit}: set {part.key} = {stated * factor:.2g} in {table} of the site file"
+    return Finding(topic, text)
