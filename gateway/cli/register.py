@@ -17,7 +17,8 @@ from gateway.cli.replay import FilesArgument
 
 if TYPE_CHECKING:
     from gateway.estimators.registration import Method
-    from gateway.offline.registration import Gathering, Result
+    from gateway.offline.pairing import Gathering
+    from gateway.offline.registration import Result
     from gateway.runtime.playback import Playback
     from gateway.settings import Site
 
@@ -75,7 +76,8 @@ def find_errors(
     from adapters.files import FileError
     from gateway.cli.progress import progressing
     from gateway.estimators.registration_frames import SYSTEMS
-    from gateway.offline.registration import LEAST_PAIRS, Gathering, method_for, registered, site_with
+    from gateway.offline.pairing import Gathering
+    from gateway.offline.registration import LEAST_PAIRS, method_for, registered, site_with
     from gateway.runtime.folder import FolderError
     from gateway.runtime.playback import open_playback
     from gateway.runtime.setup import RunFailure
