@@ -146,7 +146,7 @@ def _pairs(before: States, elapsed_s: Floats, modes: Modes, size: int) -> _Pairs
     ahead = (carry @ before.mean[:, :, None, :, :size, None])[..., 0]
     middle, joined = _joined(share, ahead, spread)
     root = _root(joined)
-    unit = np.linalg.solve(root, np.broadcast_to(np.eye(size), root.shape))
+    unit = np.asarray(np.linalg.solve(root, np.broadcast_to(np.eye(size), root.shape)), dtype=np.float64)
     one = unit[..., None, :, :]
     off = (one @ (ahead - middle[..., None, :])[..., None])[..., 0]
     with np.errstate(divide="ignore"):  # over no time at all no mode follows another
