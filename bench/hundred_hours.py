@@ -41,6 +41,13 @@ START = 1_790_000_000 * SECOND
 EVERY_S, GPS_S, SCAN_S, STEP_S = 60, 5, 4, 30
 VEHICLES, CROWD_S, CROWD_EACH_S, CROWD_STAYS_S = 40, 800, 3, 17
 PARTS, QUIET_S = 10, 70 * 60
+APART = {
+    "site",
+    "options",
+    "frame",
+    "radars",
+    "consistency",
+}  # of the state: settings, and what is kept of so many sources
 NOISE_MB = 8.0  # of the process: what allocators keep differs from hour to hour
 
 Floats = NDArray[np.float64]
@@ -201,7 +208,7 @@ def resident_mb() -> float:
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """What is held at a quiet hour: bytes of the picture's state, of the decoder, of all else; of the process, MB."""
+    """What is held at a quiet hour: bytes of the picture's state (but for `APART`), of the decoder, of all else; MB."""
 
     hour: float
     state: int
@@ -220,9 +227,9 @@ def run(hours: int, say: Callable[[str], None]) -> list[Held]:
 
     def held(hour: float) -> Held:
         gc.collect()
-        parts = session._state, session._decoder
         assert session._state is not None
-        state, decoder = (deep_size(part) for part in parts)
+        names = set(session._state.__dataclass_fields__) - APART
+        state, decoder = deep_size(*(getattr(session._state, name) for name in names)), deep_size(session._decoder)
         others = deep_size(session, drawn, published) - state - decoder
         return Held(hour, state, decoder, others, resident_mb(), session._state.lanes.next_track - 1)
 

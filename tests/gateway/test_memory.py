@@ -17,7 +17,6 @@ from gateway.observation import Heard, Observation, RadarStatus
 from gateway.settings import Options
 from gateway.state import State
 
-
 APART = ("site", "options", "frame", "radars", "consistency")  # settings, and what is bounded by its number of sources
 
 
@@ -63,7 +62,7 @@ def steps(world: Any, visits: range, every_s: float) -> Iterator[list[Heard]]:
 
 
 def test_after_hours_of_coming_and_going_the_state_is_as_it_was_at_the_beginning(world: Any) -> None:
-    """Visitors come and go for an hour and a half; an hour after the last one, every part of the state is as small as at first."""
+    """Visitors come and go for an hour and a half; an hour after the last, all parts of the state are as small as at first."""
     options = Options(prediction_period_s=30.0)
     first = pipeline.initial(world.site, options)
     state, _ = pipeline.step(first, [Heard(world.at(0.0))])
