@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 from gateway.fuse import Fused
 from gateway.sinks.arrow import SCHEMAS, TRACKS, tracks_batch
 
+SMOOTHED_PART = "smoothed.parquet.part"  # while it is written, at the end of a session
 ROW_GROUP = 16384  # rows gathered before Parquet is handed a row group: bounds memory, keeps compression good
 
 
@@ -20,7 +21,8 @@ def finish(folder: Path) -> tuple[Path, ...]:
     """Make the .parquet of every .arrows stream in a session's folder; returns the files made.
 
     Keeps every whole batch of a stream that was cut. The .arrows is removed only when its .parquet is
-    complete on disk, so a death in here loses nothing and the next call starts over. Raises OSError when the
+    complete on disk, so a death in here loses nothing and the next call starts over. What is left of smoothed tracks that
+    were never completed goes. Raises OSError when the
     disk is full.
     """
     made = []
@@ -31,6 +33,7 @@ def finish(folder: Path) -> tuple[Path, ...]:
             _convert(stream, target, schema)
             stream.unlink()
             made.append(target)
+    (folder / SMOOTHED_PART).unlink(missing_ok=True)
     return tuple(made)
 
 
@@ -65,7 +68,7 @@ class SmoothedTable:
 
     def __init__(self, folder: Path) -> None:
         self._target = folder / "smoothed.parquet"
-        self._part = self._target.with_name(self._target.name + ".part")
+        self._part = folder / SMOOTHED_PART
         self._writer = pq.ParquetWriter(self._part, TRACKS, compression="zstd", use_dictionary=_texts(TRACKS))
         self._waiting: list[Fused] = []
 

@@ -90,6 +90,21 @@ def test_pieces_do_not_depend_on_when_they_are_taken(world: Any) -> None:
         assert rows_of(one).keys() == rows_of(other).keys()
 
 
+def test_every_state_settles_once(world: Any) -> None:
+    """However the session is cut into steps: each measurement of each track in its order, late ones in their places."""
+    flight = world.flight(seconds=40.0, gps_period_s=3.0)
+    for ticks in ("one", "20 ms", "all"):
+        ran = world.run(flight, ticks=ticks, until_s=100.0)
+        left = [one for picture in ran.pictures for one in picture.fuse.settled]
+        assert remaining(ran.state.lanes) == []
+        told = [(one.track, event.measure.serial) for one in left for event in one.events]
+        assert len(set(told)) == len(told)
+        for track in {one.track for one in left}:
+            at = [event.at for one in left if one.track == track for event in one.events]
+            assert at == sorted(at)
+        assert {serial for _, serial in told} >= set(range(6, len(flight) + 1))  # the first plots only begin a track
+
+
 def test_a_plot_that_became_another_tracks_is_not_in_two(world: Any) -> None:
     """A radar track joins an aircraft in hindsight: what it wrote since then for itself is in no piece."""
     flight = [

@@ -236,7 +236,7 @@ def make_pictures(
     return [maker.picture(step, first_s, first_s + seconds, end and step == steps - 1) for step in range(steps)]
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def pictures() -> Make:
     """A function that makes the pictures of a part of the approach."""
     return make_pictures
