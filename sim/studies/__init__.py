@@ -10,6 +10,8 @@ STUDIES = (
     "smoothing",
     "alpha-beta-gamma",
     "rmimm",
+    "consistency",
+    "tuning",
     "registration",
 )  # the modules of this package that have a `run`, `-` for `_`
 

@@ -1,0 +1,267 @@
+"""Whether tracks are as sure as they say: NEES and NIS over many runs, second by second, and what the program finds by itself.
+
+NEES is the squared error of the position by the covariance that is told, NIS the squared innovation by what it should
+scatter by. Over n runs their means lie in an interval that chi-square gives; a filter is honest in a second if they do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from gateway.estimators import modes
+from gateway.estimators.kalman import Estimate, Innovation, predict
+from gateway.fuse.consistency import PLOT, REPORT, Sums
+from gateway.fuse.events import Residual
+from gateway.fuse.weighting import Model, start_from_fixes, update_with_fixes, update_with_plots
+from gateway.settings import Estimation, EstimatorName, Options, Site
+from sim.studies import Progress, Study, Table, silent
+from sim.studies.ensembles import Ensemble, Step, approach, traffic, two_turns
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+ESTIMATORS: tuple[EstimatorName, ...] = ("kalman", "imm", "rmimm")
+INSIDE = 0.95  # of the means of an honest filter
+WRONG = 1.5  # by how much settings are wrong
+AGAINST = 40  # runs that the program's own test is held against: it looks at one run at a time
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """What a filter made of an ensemble, t steps: errors (t, runs, axes), NEES and NIS (t, runs), degrees of NIS (t, runs)."""
+
+    at_s: Floats
+    off_m: Floats
+    nees: Floats
+    nis: Floats
+    degrees: NDArray[np.int64]
+    residuals: tuple[
+        tuple[int, Floats, Floats], ...
+    ]  # radar, innovations (runs, k), NaN = not measured, by their scatter
+    sigmas: dict[int, Floats]  # as stated, (k,) by radar, 0 = of reports
+
+    def rmse_m(self, since_s: float) -> float:
+        """Of the position, over all runs."""
+        return math.sqrt(float((self.off_m[self.at_s >= since_s] ** 2).sum(axis=-1).mean()))
+
+
+@dataclass(frozen=True, slots=True)
+class Seconds:
+    """An ensemble second by second: means over the runs for each degree of freedom, and whether they lie inside."""
+
+    second: NDArray[np.int64]
+    nees: Floats
+    nees_inside: Bools
+    nis: Floats
+    nis_inside: Bools
+
+
+def run(runs: int = 100, seed: int = 1, *, rrd: Path | None = None, progress: Progress = silent) -> Study:
+    """Shares of the seconds in which mean NEES and NIS are inside, by case and estimator, and what the program says.
+
+    `rrd`: where NEES and NIS are drawn second by second, or None.
+    """
+    cases = {
+        "003's approach": [approach(runs, seed)],
+        "000's case": [two_turns(runs, seed)],
+        "000's case, velocity measured": [two_turns(runs, seed, velocity=True)],
+        "scene traffic": traffic(runs, seed),
+    }
+    rows: list[tuple[str | float, ...]] = []
+    figures: dict[str, float] = {}
+    drawn: dict[str, Seconds] = {}
+    for place, (name, ensembles) in enumerate(cases.items()):
+        for turn, estimator in enumerate(ESTIMATORS):
+            progress(f"{name}, {estimator}", (place + turn / len(ESTIMATORS)) / (len(cases) + 1))
+            each = [(one, follow(one, model_of(one, Options(estimator=estimator)))) for one in ensembles]
+            found = joined([by_second(followed, one) for one, followed in each])
+            drawn[f"{name}/{estimator}"] = found
+            rows.append((name, estimator, *_cells(found), _rmse_m(each)))
+            figures |= {f"NEES {name}, {estimator}": float(found.nees_inside.mean())}
+            figures |= {f"NIS {name}, {estimator}": float(found.nis_inside.mean())}
+    progress("settings wrong by 1.5", len(cases) / (len(cases) + 1))
+    table, said = _settings(min(runs, AGAINST), seed)
+    if rrd is not None:
+        from sim.studies.consistency_figures import draw
+
+        draw(rrd, drawn, runs)
+    shown = Table(f"mean NEES of the position and NIS over {runs} runs, second by second", COLUMNS, tuple(rows), NOTES)
+    return Study("consistency", runs, seed, (shown, table), figures | said, str(rrd) if rrd else None)
+
+
+COLUMNS = (
+    *(
+        "case",
+        "estimator",
+        "NEES inside, % of seconds",
+        "below %",
+        "mean",
+        "NIS inside, % of seconds",
+        "below %",
+        "mean",
+    ),
+    "RMSE m",
+)
+NOTES = (
+    "inside the 95 % interval that chi-square gives; means for each degree of freedom, 1 = as told; 000's case in the plane",
+    "below: surer than told, the careful side",
+)
+
+
+def _cells(found: Seconds) -> tuple[float, ...]:
+    cells: list[float] = []
+    for value, inside in ((found.nees, found.nees_inside), (found.nis, found.nis_inside)):
+        cells += [100.0 * inside.mean(), 100.0 * (~inside & (value < 1.0)).mean(), value.mean()]
+    return tuple(map(float, cells))
+
+
+def _rmse_m(each: Sequence[tuple[Ensemble, Followed]]) -> float:
+    square = [(followed.off_m[followed.at_s >= one.since_s] ** 2).sum(axis=-1).ravel() for one, followed in each]
+    return math.sqrt(float(np.concatenate(square).mean()))
+
+
+def model_of(ensemble: Ensemble, options: Options, estimation: Estimation = Estimation()) -> Model:
+    """The gateway's model of an ensemble's site and position source."""
+    return Model.of(options, ensemble.position, ensemble.frames, estimation)
+
+
+def follow(ensemble: Ensemble, model: Model) -> Followed:
+    """The gateway's filter over an ensemble, all runs as one batch."""
+    first, runs, axes = ensemble.steps[0], ensemble.runs, ensemble.axes
+    sigmas = _sigmas(ensemble)
+    place, sigma = np.where(np.isnan(first.value), 0.0, first.value), np.tile(sigmas[0], (runs, 1))
+    state = start_from_fixes(place, sigma[:, :3], first.velocity, sigma[:, 3], model)
+    mixture = None if model.modes is None else modes.begin(state, model.modes)
+    at_s, off, nees, nis, degrees, residuals = first.at_s, [], [], [], [], []
+    for step in ensemble.steps[1:]:
+        elapsed_s, at_s = np.full(runs, step.at_s - at_s), step.at_s
+        if mixture is None or model.modes is None:
+            state, told = _updated(predict(state, elapsed_s, model.motion), step, sigmas[step.radar], model)
+            innovation, scatter = told.innovation, told.covariance
+        else:
+            mixture = modes.predict(mixture, elapsed_s, model.modes)
+            after, told = _updated(mixture.each(), step, sigmas[step.radar], model)
+            mixture, in_all = modes.weigh(mixture, after, told, model.modes)
+            state, innovation, scatter = modes.stated(mixture), in_all.innovation, in_all.scatter
+        measured = told.measured[:: model.together]
+        wrong = state.mean[:, :axes] - step.true_enu_m[:axes]
+        off.append(wrong)
+        nees.append(_normalised(wrong, state.covariance[:, :axes, :axes]))
+        nis.append(_normalised(innovation, scatter))
+        degrees.append(measured.sum(axis=1))
+        known, along = np.where(measured, innovation, np.nan), np.arange(innovation.shape[1])
+        residuals.append((step.radar, known, known / np.sqrt(scatter[:, along, along])))
+    times = np.array([step.at_s for step in ensemble.steps[1:]])
+    return Followed(times, np.array(off), np.array(nees), np.array(nis), np.array(degrees), tuple(residuals), sigmas)
+
+
+def _sigmas(ensemble: Ensemble) -> dict[int, Floats]:
+    """The stated noise of each radar's components, and under 0 that of reports: position and velocity, (6,)."""
+    position = ensemble.position
+    sigmas = {0: np.repeat([position.sigma_m, position.velocity_sigma_mps], 3)}
+    for radar in ensemble.site.radars:
+        sigmas[radar.number] = np.array([radar.range_sigma_m, radar.azimuth_sigma_rad, radar.elevation_sigma_rad])
+    return sigmas
+
+
+def _updated(state: Estimate, step: Step, sigma: Floats, model: Model) -> tuple[Estimate, Innovation]:
+    """States of all runs (and modes) after a step."""
+    m, rows = model.together, len(state.mean)
+    value, sigmas = np.repeat(step.value, m, axis=0), np.tile(sigma, (rows, 1))
+    if step.radar:
+        return update_with_plots(state, value, sigmas, model.radars[step.radar], m)
+    velocity, memory = np.repeat(step.velocity, m, axis=0), np.zeros((rows, 0, 3))
+    after, told, _ = update_with_fixes(state, value, sigmas[:, :3], velocity, sigmas[:, 3], memory, model)
+    return after, told
+
+
+def _normalised(off: Floats, covariance: Floats) -> Floats:
+    return np.asarray((off[:, None] @ np.linalg.inv(covariance) @ off[:, :, None])[:, 0, 0])
+
+
+def by_second(followed: Followed, ensemble: Ensemble) -> Seconds:
+    """NEES after the last measurement of each second, NIS over all of its measurements."""
+    low, high = 0.5 * (1.0 - INSIDE), 0.5 * (1.0 + INSIDE)
+    runs, axes = ensemble.runs, ensemble.axes
+    seconds = np.floor(followed.at_s).astype(np.int64)
+    chosen = np.unique(seconds[followed.at_s >= ensemble.since_s])
+    nees, nis, nis_inside = [], [], []
+    for second in chosen:
+        here = np.flatnonzero(seconds == second)
+        nees.append(followed.nees[here[-1]].mean() / axes)
+        total, degrees = followed.nis[here].sum(), followed.degrees[here].sum()
+        nis.append(total / degrees)
+        nis_inside.append(chi2.ppf(low, degrees) <= total <= chi2.ppf(high, degrees))
+    mean = np.array(nees)
+    least, most = (chi2.ppf(share, runs * axes) / (runs * axes) for share in (low, high))
+    return Seconds(chosen, mean, (least <= mean) & (mean <= most), np.array(nis), np.array(nis_inside))
+
+
+def joined(parts: Sequence[Seconds]) -> Seconds:
+    """The seconds of several aircraft, one after another."""
+    return Seconds(
+        np.concatenate([part.second for part in parts]),
+        np.concatenate([part.nees for part in parts]),
+        np.concatenate([part.nees_inside for part in parts]),
+        np.concatenate([part.nis for part in parts]),
+        np.concatenate([part.nis_inside for part in parts]),
+    )
+
+
+def findings(followed: Followed, index: int) -> dict[str, float]:
+    """What the program's own test (`gateway.fuse.consistency`) finds in one run: the first factor of each component."""
+    sums: dict[str, Sums] = {}
+    latest: dict[int, Residual] = {}
+    found: dict[str, float] = {}
+    for radar, innovation, by_scatter in followed.residuals:
+        latest[radar] = Residual.after(latest.get(radar), innovation[index], by_scatter[index])
+        for part in PLOT if radar else REPORT:
+            some, sigma = slice(part.first, part.last), float(followed.sigmas[radar][part.first])
+            sums[part.name] = sums.get(part.name, Sums()).then(latest[radar], some, sigma)
+            factor = sums[part.name].factor
+            if factor is not None:
+                found.setdefault(part.name, factor)
+    return found
+
+
+def _settings(runs: int, seed: int) -> tuple[Table, dict[str, float]]:
+    """In how many runs the program says that a noise is wrong: none is, and each in turn by 1.5, either way."""
+    rows: list[tuple[str | float, ...]] = []
+    figures: dict[str, float] = {}
+    base = approach(runs, seed)
+    for estimator in ("kalman", "rmimm"):
+        options = Options(estimator=estimator)
+        for part in (None, REPORT[0], *PLOT):
+            for stated in (1.0,) if part is None else (1.0 / WRONG, WRONG):
+                ensemble = base if part is None else _stated(base, part.key, stated)
+                followed = follow(ensemble, model_of(ensemble, options))
+                each = [findings(followed, index) for index in range(runs)]
+                right = [one for one in each if part is not None and part.name in one]
+                wrong = [one for one in each if any(part is None or name != part.name for name in one)]
+                told = float(np.mean([one[part.name] for one in right])) if part is not None and right else math.nan
+                name = "every noise as stated" if part is None else f"{part.name} stated {stated:.2f} times"
+                share = math.nan if part is None else 100.0 * len(right) / runs
+                rows.append((name, estimator, share, told, 100.0 * len(wrong) / runs))
+                figures |= {
+                    f"found {name}, {estimator}": share,
+                    f"false {name}, {estimator}": 100.0 * len(wrong) / runs,
+                }
+    columns = ("003's approach", "estimator", "said in % of runs", "factor said", "other components in % of runs")
+    return Table(f"what the program says of its own settings, {runs} runs", columns, tuple(rows)), figures
+
+
+def _stated(ensemble: Ensemble, key: str, factor: float) -> Ensemble:
+    """The same measurements with one noise stated so many times what it is."""
+    if key == "sigma_m":
+        return replace(ensemble, position=replace(ensemble.position, sigma_m=factor * ensemble.position.sigma_m))
+    site: Site = ensemble.site
+    inside = key.replace("_deg", "_rad")
+    radars = tuple(replace(radar, **{inside: factor * getattr(radar, inside)}) for radar in site.radars)
+    return replace(ensemble, site=replace(site, radars=radars))
