@@ -99,7 +99,7 @@ class RerunSink:
 
     def write_smoothed(self, fused: Fused, step: NDArray[np.int64]) -> None:
         """Draw smoothed rows of one track in the order of time, and the numbers of their pictures; raises OSError."""
-        self._send(self._smoothed.entries(fused, step))
+        self._send([*self._smoothed.entries(fused, step), *self._scope.smoothed_entries(fused, step)])
 
     def end_smoothed(self, track: int, at: int, step: int) -> None:
         """A track ended then, in that picture, and leaves the scene; raises OSError."""

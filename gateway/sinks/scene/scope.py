@@ -13,6 +13,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from gateway.fuse import Fused
 from gateway.settings import Runway, Site
 from gateway.sinks.scene import style
 from gateway.sinks.scene.entry import Always, Entry, entity, rows
@@ -25,6 +26,7 @@ Floats = NDArray[np.float64]
 
 STRETCH = 10.0
 ROOT = "/approach/scope"
+_ABOVE = {style.FUSED: 31.0, style.SMOOTHED: 32.0}
 
 
 class Scope:
@@ -82,6 +84,12 @@ class ScopeScene:
             entries += self._dots(path, style.FUSED, 1.2, flown.time, flown.step, flown.runway_m, flown.has_height)
         return entries
 
+    def smoothed_entries(self, fused: Fused, step: NDArray[np.int64]) -> list[Entry]:
+        """The rows of one smoothed track, in the order of time, on top of the filter's."""
+        path = entity("approach", "scope", "smoothed", int(fused.track[0]))
+        has_height = np.asarray(np.isfinite(fused.height_m))
+        return self._dots(path, style.SMOOTHED, 0.8, fused.time, step, fused.runway_m, has_height)
+
     def _dots(
         self,
         path: str,
@@ -100,9 +108,7 @@ class ScopeScene:
             return []
         entries: list[Entry] = []
         if self._looked.is_new(path, int(time[-1])):
-            look = rr.Points2D.from_fields(
-                colors=colour, radii=style.points(size), draw_order=31.0 if colour == style.FUSED else 30.0
-            )
+            look = rr.Points2D.from_fields(colors=colour, radii=style.points(size), draw_order=_ABOVE.get(colour, 30.0))
             entries.append(Always(path, (look,)))
         dots = rr.Points2D.columns(positions=spots[shown]).partition(shown[known].sum(axis=1))
         return [*entries, rows(path, time[known], step[known], dots)]

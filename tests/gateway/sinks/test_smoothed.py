@@ -80,6 +80,14 @@ def test_its_line_is_of_its_own_colour_and_goes_on_over_the_pieces(drawn: Any) -
     assert colours.isdisjoint(others)
 
 
+def test_it_is_on_the_controllers_screen(drawn: Any) -> None:
+    """Where the filter's dots are, one for each row that is on the screen."""
+    track, found = drawn
+    dots = [row["utc"] for row in found["/approach/scope/smoothed/1"] if "utc" in row]
+    assert dots == [row["utc"] for row in found["/approach/scope/1"] if "utc" in row]
+    assert 0 < len(dots) <= len(track.time)
+
+
 def test_a_track_that_ended_takes_its_smoothed_one_along(drawn: Any) -> None:
     """The last thing that is told of it is that it is gone, with all that is below it."""
     track, found = drawn
