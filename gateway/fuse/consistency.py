@@ -9,7 +9,7 @@ too large   they are smaller than the stated noise alone (R). However a target m
             holds the noise of both measurements: only noise that is less than stated makes it small
 
 What a stream says of its own accuracy is only held against the first: a receiver's error that lasts is part of that, and the
-track follows it.
+track follows it. For the same reason nothing is said of a receiver whose reports hardly change against each other.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ LEAST = 60.0  # measurements before anything is said
 SURE_TOO_SMALL, SURE_TOO_LARGE = 4.0, 3.0
 TOO_SMALL, TOO_LARGE = 1.3, 0.72  # of squares: what a model of motion is off by is not the noise's fault
 MOST, BOUNDED_MEAN = 4.0, 0.9205  # of squares, and the mean of a square of unit variance that is bounded so
+LASTING = 0.3  # a receiver whose reports change by less than this share of what is stated has errors that last
 SOURCES_AT_MOST = 4096  # the least lately heard are forgotten
 
 
@@ -132,7 +133,8 @@ class Consistency:
                 key = source, part.name, usual is not None and math.isclose(stated, usual, rel_tol=1e-9)
                 sums[key] = sums.pop(key, Sums()).then(event.residual, some, stated)
                 factor = sums[key].factor
-                if factor is not None and (key[2] or factor > 1.0):
+                told_least = 0.0 if isinstance(event.measure, Plot) else LASTING
+                if factor is not None and (factor > 1.0 or (key[2] and factor > told_least)):
                     findings.append(_finding(event.measure, source, part, stated, factor, key[2]))
         while len(sums) > SOURCES_AT_MOST:
             del sums[next(iter(sums))]

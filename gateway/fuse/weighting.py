@@ -58,16 +58,16 @@ class Model:
         options: Options,
         position: PositionSource,
         radars: Mapping[int, RadarFrame],
-        estimation: Estimation = Estimation(),
+        fly: Estimation = Estimation(),
     ) -> Model:
-        """The model that the options, the site's position source and its estimation ask for."""
+        """The model that the options, the site's position source and how aircraft fly there ask for."""
         level = options.acceleration_sigma_mps2**2 * options.acceleration_time_s
         upright = options.vertical_acceleration_sigma_mps2**2 * options.acceleration_time_s
         error = position.systematic_m / math.sqrt(3.0) if options.weighting == "bias" else 0.0
         motion = Motion((level, level, upright), error)
         confirm_score = math.log(options.confirm_odds)
         light = LIGHT if options.estimator == "alpha-beta-gamma" else None
-        return cls(options.weighting, motion, radars, modes_of(options, motion, estimation), confirm_score, light)
+        return cls(options.weighting, motion, radars, modes_of(options, motion, fly), confirm_score, light)
 
     @property
     def together(self) -> int:
@@ -80,7 +80,7 @@ class Model:
         return WINDOW if self.weighting == "innovation" else 0
 
 
-def modes_of(options: Options, motion: Motion, estimation: Estimation) -> Modes | None:
+def modes_of(options: Options, motion: Motion, fly: Estimation) -> Modes | None:
     """The set of modes that the options ask for, as the site has them, or None for the one of `motion`.
 
     Straight flight comes in two: calm, in which noise is taken off best, and with changes of speed, climb or course that are
@@ -89,21 +89,17 @@ def modes_of(options: Options, motion: Motion, estimation: Estimation) -> Modes 
     if options.estimator == "kalman" or options.estimator == "alpha-beta-gamma":
         return None
 
-    def moving(level_mps2: float, upright_mps2: float) -> Motion:
+    def way(turn: float, level_mps2: float, upright_mps2: float, share: float) -> Mode:
         level, upright = level_mps2**2 * ACCELERATES_S, upright_mps2**2 * ACCELERATES_S
-        return replace(motion, acceleration_density=(level, level, upright))
+        return Mode(turn, replace(motion, acceleration_density=(level, level, upright)), share)
 
-    chosen = estimation
-    calm = moving(chosen.calm_acceleration_mps2, chosen.calm_acceleration_mps2)
-    manoeuvring = moving(chosen.manoeuvre_acceleration_mps2, chosen.manoeuvre_vertical_acceleration_mps2)
-    turning = moving(chosen.turn_acceleration_mps2, chosen.turn_acceleration_mps2)
     ways = (
-        Mode(0.0, calm, chosen.calm_share),
-        Mode(0.0, manoeuvring, chosen.manoeuvre_share),
-        Mode(1.0, turning, 0.5 * chosen.turn_share),
-        Mode(-1.0, turning, 0.5 * chosen.turn_share),
+        way(0.0, fly.calm_acceleration_mps2, fly.calm_acceleration_mps2, fly.calm_share),
+        way(0.0, fly.manoeuvre_acceleration_mps2, fly.manoeuvre_vertical_acceleration_mps2, fly.manoeuvre_share),
+        way(1.0, fly.turn_acceleration_mps2, fly.turn_acceleration_mps2, 0.5 * fly.turn_share),
+        way(-1.0, fly.turn_acceleration_mps2, fly.turn_acceleration_mps2, 0.5 * fly.turn_share),
     )
-    return Modes(ways, options.estimator, chosen.mode_lasts_s, chosen.turn_rate_rps, chosen.bank_rad)
+    return Modes(ways, options.estimator, fly.mode_lasts_s, fly.turn_rate_rps, fly.bank_rad)
 
 
 def start_from_fixes(

@@ -110,6 +110,12 @@ def test_what_a_stream_says_of_itself_is_never_too_careful(world: Any) -> None:
     assert "its stream says (6 m)" in ran.said("scatters")[0].text
 
 
+def test_a_receiver_whose_errors_last_is_believed(world: Any) -> None:
+    """Reports that are all off by the same few metres change by nothing: that says nothing of 15 m, which they may be off by."""
+    reports = [world.report(world.Course(), 0.5 * k, off_m=(6.0, -5.0, 4.0)) for k in range(300)]
+    assert world.run(reports).said("scatters") == []
+
+
 def test_the_parts_of_a_plot_are_keys_of_the_site_file(world: Any) -> None:
     """What is said to be set can be set: each key is one that a radar's table has."""
     assert {part.key for part in PLOT} == {"range_sigma_m", "azimuth_sigma_deg", "elevation_sigma_deg"}
