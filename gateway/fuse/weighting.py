@@ -35,7 +35,6 @@ LEAST_RESIDUAL = 1e-3  # sigmas; the literal weights are singular at a residual 
 LIGHT = Tuning(robust=math.sqrt(3.0) * ROBUST_SIGMA, least_density=0.01)
 
 AXES = np.arange(3)
-
 # What a GPS report measures of the state: position (and, where the source may be wrong, its error), and velocity.
 _FIX = np.eye(6, SIZE)[None]
 _FIX_WITH_ERROR = _FIX + np.eye(6, SIZE, 6)
