@@ -41,13 +41,7 @@ START = 1_790_000_000 * SECOND
 EVERY_S, GPS_S, SCAN_S, STEP_S = 60, 5, 4, 30
 VEHICLES, CROWD_S, CROWD_EACH_S, CROWD_STAYS_S = 40, 800, 3, 17
 PARTS, QUIET_S = 10, 70 * 60
-APART = {
-    "site",
-    "options",
-    "frame",
-    "radars",
-    "consistency",
-}  # of the state: settings, and what is kept of so many sources
+APART = {"site", "options", "frame", "radars"}  # of the state: what was settled before the first arrival
 NOISE_MB = 8.0  # of the process: what allocators keep differs from hour to hour
 
 Floats = NDArray[np.float64]

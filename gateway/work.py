@@ -79,7 +79,7 @@ class Work:
     def _whole_second(self, at: int) -> None:
         """Ends, coasting, predictions, what scatters otherwise than stated, and forgetting what is older than the history."""
         self._settle()
-        self.consistency, findings = self.consistency.judged(self.site.position, self.radars)
+        self.consistency, findings = self.consistency.judged(self.site.position, self.radars, at)
         for found in findings:
             self.once(found.text, topic=found.topic)
         lanes, ended = fuse.end_silent(self.lanes, at, self.options)

@@ -36,6 +36,7 @@ TOO_SMALL, TOO_LARGE = 1.3, 0.72  # of squares: what a model of motion is off by
 MOST, BOUNDED_MEAN = 4.0, 0.9205  # of squares, and the mean of a square of unit variance that is bounded so
 LASTING = 0.3  # a receiver whose reports change by less than this share of what is stated has errors that last
 SOURCES_AT_MOST = 4096  # the least lately heard are forgotten
+FORGOTTEN_NS = 3_600_000_000_000  # and those that were not heard for so long
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,17 +117,25 @@ class Consistency:
         default_factory=dict
     )  # source, part, whether the site file sets it
     waiting: tuple[Event, ...] = ()
+    heard: Mapping[str, int] = field(default_factory=dict)  # when each source was last
 
     def hearing(self, events: Iterable[Event]) -> Consistency:
         """The same with new measurements waiting to be judged."""
-        return Consistency(self.sums, (*self.waiting, *(event for event in events if event.residual is not None)))
+        told = (event for event in events if event.residual is not None)
+        return Consistency(self.sums, (*self.waiting, *told), self.heard)
 
-    def judged(self, position: PositionSource, radars: Mapping[int, RadarSite]) -> tuple[Consistency, list[Finding]]:
-        """The same with what waited worked in, in order of arrival, and what is sure by now."""
-        sums, findings = dict(self.sums), []
+    def judged(
+        self, position: PositionSource, radars: Mapping[int, RadarSite], at: int = 0
+    ) -> tuple[Consistency, list[Finding]]:
+        """The same with what waited worked in, in order of arrival, and what is sure by now.
+
+        Sources that were not heard for an hour before `at` are forgotten.
+        """
+        sums, heard, findings = dict(self.sums), dict(self.heard), []
         for event in sorted(self.waiting, key=lambda event: event.measure.serial):
             assert event.residual is not None
             source, sigma = _source_of(event.measure)
+            heard[source] = event.at
             for part, usual in _parts(event.measure, position, radars):
                 some = slice(part.first, part.last)
                 stated = float(sigma[part.first])
@@ -137,8 +146,14 @@ class Consistency:
                 if factor is not None and (factor > 1.0 or (key[2] and factor > told_least)):
                     findings.append(_finding(event.measure, source, part, stated, factor, key[2]))
         while len(sums) > SOURCES_AT_MOST:
-            del sums[next(iter(sums))]
-        return Consistency(sums), findings
+            oldest = next(iter(sums))
+            del sums[oldest]
+            heard.pop(oldest[0], None)
+        gone = {source for source, last in heard.items() if last < at - FORGOTTEN_NS}
+        if gone:
+            sums = {key: one for key, one in sums.items() if key[0] not in gone}
+            heard = {source: last for source, last in heard.items() if source not in gone}
+        return Consistency(sums, heard=heard), findings
 
 
 def _source_of(measure: Measure) -> tuple[str, Floats]:

@@ -119,3 +119,12 @@ def test_a_receiver_whose_errors_last_is_believed(world: Any) -> None:
 def test_the_parts_of_a_plot_are_keys_of_the_site_file(world: Any) -> None:
     """What is said to be set can be set: each key is one that a radar's table has."""
     assert {part.key for part in PLOT} == {"range_sigma_m", "azimuth_sigma_deg", "elevation_sigma_deg"}
+
+
+def test_sources_that_are_gone_for_an_hour_are_forgotten() -> None:
+    """What is known of a source stays while it is heard, and an hour longer."""
+    known = {(f"GPS of {name}", "position", True): Sums(1.0) for name in "ab"}
+    hour = 3_600_000_000_000
+    kept, _ = Consistency(known, heard={"GPS of a": 0, "GPS of b": hour}).judged(PositionSource(), {}, hour + 1)
+    assert list(kept.sums) == [("GPS of b", "position", True)]
+    assert list(kept.heard) == ["GPS of b"]

@@ -17,7 +17,7 @@ from gateway.observation import Heard, Observation, RadarStatus
 from gateway.settings import Options
 from gateway.state import State
 
-APART = ("site", "options", "frame", "radars", "consistency")  # settings, and what is bounded by its number of sources
+APART = ("site", "options", "frame", "radars")
 
 
 def held(state: State) -> dict[str, int]:
@@ -75,9 +75,10 @@ def test_after_hours_of_coming_and_going_the_state_is_as_it_was_at_the_beginning
     ended = held(state)
     for name in ("tracks", "association", "lanes"):
         assert busy[name] > 5 * began[name]
-    # what is left: numbers that have become larger ints, and a few counters
-    assert {name: ended[name] - began[name] for name in ended if ended[name] > began[name] + 64} == {}
-    assert sum(ended.values()) < sum(began.values()) + 400
+    # what is left: numbers that have become larger ints, a few counters, and sentences that are said once
+    left = {name: ended[name] - began[name] for name in ended if ended[name] > began[name] + 64}
+    assert left.keys() <= {"said"}
+    assert sum(ended.values()) < sum(began.values()) + 1000
 
 
 def test_aircraft_that_are_gone_are_remembered_in_a_bounded_number(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
