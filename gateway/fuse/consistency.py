@@ -32,7 +32,7 @@ LEAST = 60.0  # measurements before anything is said
 # Standard deviations, so that among thousands of sources none is suspected by chance; the lower end of chi-square is the
 # steeper one, and an honest source is some way above it.
 SURE_TOO_SMALL, SURE_TOO_LARGE = 4.0, 3.0
-TOO_SMALL, TOO_LARGE = 1.3, 0.72  # of squares: what a model of motion is off by is not the noise's fault
+TOO_SMALL, TOO_LARGE = 1.45, 0.72  # of squares: what a model of motion is off by is not the noise's fault
 MOST, BOUNDED_MEAN = 4.0, 0.9205  # of squares, and the mean of a square of unit variance that is bounded so
 LASTING = 0.3  # a receiver whose reports change by less than this share of what is stated has errors that last
 SOURCES_AT_MOST = 4096  # the least lately heard are forgotten
