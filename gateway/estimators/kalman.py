@@ -61,7 +61,7 @@ class Motion:
 
     acceleration_density: tuple[float, float, float]  # m2/s3 east, north, up: growth of velocity's variance a second
     error_sigma_m: float  # an axis; 0 = the position source is taken to have no constant error
-    error_time_constant_s: float = 36000.0
+    error_time_constant_s: float = 1e6
 
     def noise(self, elapsed_s: Floats, keep: Floats) -> Floats:
         """Process noise (n, 9, 9) over times (n, 1, 1) >= 0, of which the source errors keep a share (n, 1, 1)."""
