@@ -15,7 +15,7 @@ track follows it. For the same reason nothing is said of a receiver whose report
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -73,14 +73,17 @@ class Sums:
 
     def then(self, residual: Residual, some: slice, sigma: float) -> Sums:
         """The same after some components of a measurement whose noise is stated as `sigma`."""
-        by_scatter, by_noise = _squares(residual.change_by_scatter[some]), _squares(residual.change[some] / sigma)
-        bounded = math.fsum(min(square, MOST) for square in by_scatter) / BOUNDED_MEAN
-        keep = 1.0 - len(by_scatter) / MEMORY
+        by_scatter, by_noise = residual.change_by_scatter[None, some], residual.change[None, some]
+        return self.plus(*_squares(by_scatter, by_noise, np.array([sigma]))[0])
+
+    def plus(self, count: float, by_scatter: float, bounded: float, by_noise: float) -> Sums:
+        """The same with the sums over a measurement's components, of which so many are known."""
+        keep = 1.0 - count / MEMORY
         return Sums(
-            keep * self.count + len(by_scatter),
-            keep * self.by_scatter + math.fsum(by_scatter),
+            keep * self.count + count,
+            keep * self.by_scatter + by_scatter,
             keep * self.bounded + bounded,
-            keep * self.by_noise + math.fsum(by_noise),
+            keep * self.by_noise + by_noise,
         )
 
     @property
@@ -96,9 +99,14 @@ class Sums:
         return None
 
 
-def _squares(values: Floats) -> list[float]:
-    """The squares of those values that are known."""
-    return [value * value for value in values.tolist() if value == value]
+def _squares(by_scatter: Floats, change: Floats, sigma: Floats) -> list[list[float]]:
+    """What n measurements of some components (n, c) with stated noise (n,) add to `Sums`: n rows for `Sums.plus`."""
+    known = by_scatter == by_scatter
+    scatter = np.where(known, by_scatter * by_scatter, 0.0)
+    noise = np.where(known, (change / sigma[:, None]) ** 2, 0.0)
+    bounded = np.minimum(scatter, MOST) / BOUNDED_MEAN
+    rows: list[list[float]] = np.stack([part.sum(axis=1) for part in (known, scatter, bounded, noise)], axis=1).tolist()
+    return rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,24 +135,28 @@ class Consistency:
     def judged(
         self, position: PositionSource, radars: Mapping[int, RadarSite], at: int = 0
     ) -> tuple[Consistency, list[Finding]]:
-        """The same with what waited worked in, in order of arrival, and what is sure by now.
+        """The same with what waited worked in, in order of arrival, and what is sure by now, once of each.
 
         Sources that were not heard for an hour before `at` are forgotten.
         """
-        sums, heard, findings = dict(self.sums), dict(self.heard), []
-        for event in sorted(self.waiting, key=lambda event: event.measure.serial):
-            assert event.residual is not None
-            source, sigma = _source_of(event.measure)
+        sums, heard, found = dict(self.sums), dict(self.heard), dict[tuple[str, str], Finding]()
+        waiting = sorted(self.waiting, key=lambda event: event.measure.serial)
+        parts = _parts([event for event in waiting if isinstance(event.measure, Fix)])
+        parts |= _parts([event for event in waiting if isinstance(event.measure, Plot)])
+        for event in waiting:
+            measure = event.measure
+            source = f"GPS of {measure.aircraft}" if isinstance(measure, Fix) else f"radar {measure.radar}"
             heard[source] = event.at
-            for part, usual in _parts(event.measure, position, radars):
-                some = slice(part.first, part.last)
-                stated = float(sigma[part.first])
-                key = source, part.name, usual is not None and math.isclose(stated, usual, rel_tol=1e-9)
-                sums[key] = sums.pop(key, Sums()).then(event.residual, some, stated)
-                factor = sums[key].factor
-                told_least = 0.0 if isinstance(event.measure, Plot) else LASTING
-                if factor is not None and (factor > 1.0 or (key[2] and factor > told_least)):
-                    findings.append(_finding(event.measure, source, part, stated, factor, key[2]))
+            usual = _usual(measure, position, radars)
+            for (part, stated, added), said in zip(parts[measure.serial], usual, strict=True):
+                is_set = said is not None and math.isclose(stated, said, rel_tol=1e-9)
+                key = source, part.name, is_set
+                after = sums[key] = sums.pop(key, NOTHING).plus(*added)
+                if (source, part.name) not in found:
+                    factor = after.factor
+                    told_least = 0.0 if isinstance(measure, Plot) else LASTING
+                    if factor is not None and (factor > 1.0 or (is_set and factor > told_least)):
+                        found[source, part.name] = _finding(measure, source, part, stated, factor, is_set)
         while len(sums) > SOURCES_AT_MOST:
             oldest = next(iter(sums))
             del sums[oldest]
@@ -153,27 +165,43 @@ class Consistency:
         if gone:
             sums = {key: one for key, one in sums.items() if key[0] not in gone}
             heard = {source: last for source, last in heard.items() if source not in gone}
-        return Consistency(sums, heard=heard), findings
+        return Consistency(sums, heard=heard), list(found.values())
 
 
-def _source_of(measure: Measure) -> tuple[str, Floats]:
-    """The source's name and the stated sigma of each component."""
-    if isinstance(measure, Plot):
-        return f"radar {measure.radar}", np.array(measure.sigma)
-    return f"GPS of {measure.aircraft}", np.concatenate([measure.sigma_m, np.full(3, measure.velocity_sigma_mps)])
+NOTHING = Sums()
+Told = tuple[Part, float, list[float]]  # of one part of a measurement: the stated sigma, and what it adds to the sums
 
 
-def _parts(
-    measure: Measure, position: PositionSource, radars: Mapping[int, RadarSite]
-) -> list[tuple[Part, float | None]]:
-    """A measurement's parts, each with the sigma that the site file sets."""
+def _parts(events: Sequence[Event]) -> dict[int, list[Told]]:
+    """What measurements of one kind tell, by their serial numbers: all of a second in one go."""
+    if not events:
+        return {}
+    residuals = [event.residual for event in events if event.residual is not None]
+    by_scatter = np.array([one.change_by_scatter for one in residuals])
+    change = np.array([one.change for one in residuals])
+    sigma = np.array([_stated(event.measure) for event in events])
+    columns = []
+    for number, part in enumerate(REPORT if isinstance(events[0].measure, Fix) else PLOT):
+        some = slice(part.first, part.last)
+        added = _squares(by_scatter[:, some], change[:, some], sigma[:, number])
+        columns.append([(part, *one) for one in zip(sigma[:, number].tolist(), added, strict=True)])
+    told = zip(*columns, strict=True)
+    return {event.measure.serial: list(one) for event, one in zip(events, told, strict=True)}
+
+
+def _stated(measure: Measure) -> tuple[float, ...]:
+    """The stated sigma of each part."""
+    return measure.sigma if isinstance(measure, Plot) else (float(measure.sigma_m[0]), measure.velocity_sigma_mps)
+
+
+def _usual(measure: Measure, position: PositionSource, radars: Mapping[int, RadarSite]) -> tuple[float | None, ...]:
+    """The sigma of each part that the site file sets."""
     if isinstance(measure, Fix):
-        return list(zip(REPORT, (position.sigma_m, position.velocity_sigma_mps), strict=True))
+        return position.sigma_m, position.velocity_sigma_mps
     radar = radars.get(measure.radar)
-    said: tuple[float | None, ...] = (None,) * 3
-    if radar is not None:
-        said = (radar.range_sigma_m, radar.azimuth_sigma_rad, radar.elevation_sigma_rad)
-    return list(zip(PLOT, said, strict=True))
+    if radar is None:
+        return None, None, None
+    return radar.range_sigma_m, radar.azimuth_sigma_rad, radar.elevation_sigma_rad
 
 
 def _finding(measure: Measure, source: str, part: Part, sigma: float, factor: float, is_set: bool) -> Finding:
