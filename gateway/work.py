@@ -11,6 +11,7 @@ from gateway.align import SECOND, Fix, Geoid, Plot
 from gateway.associate import Association, Change, Setting, Spans
 from gateway.frames import RadarFrame
 from gateway.fuse import Adopted, Ended, Lanes, LifeChange, Scene, Settled
+from gateway.fuse.consistency import Finding
 from gateway.fuse.filtering import Job
 from gateway.fuse.rows import Row
 from gateway.fuse.weighting import Model
@@ -81,7 +82,7 @@ class Work:
         self._settle()
         self.consistency, findings = self.consistency.judged(self.site.position, self.radars, at)
         for found in findings:
-            self.once(found.text, topic=found.topic)
+            self._say_scatter(found)
         lanes, ended = fuse.end_silent(self.lanes, at, self.options)
         self.ended += ended
         self.events += [Event(at, "info", f"track {end.track} ended: {end.reason}") for end in ended if not end.quiet]
@@ -110,6 +111,14 @@ class Work:
             self.events.append(Event(at, "info", text))
         if self.reported:
             self.reported = frozenset(change for change in self.reported if change.at >= before - 60 * SECOND)
+
+    def _say_scatter(self, found: Finding) -> None:
+        """A source that scatters otherwise than stated, said once; of aircraft only the first are named."""
+        named = sum(", GPS of " in about for about in self.said)
+        if ", GPS of " in found.topic and found.topic not in self.said and named >= NAMED_AT_MOST:
+            self.once("more aircraft's positions scatter otherwise than is stated of them: they are not named")
+        else:
+            self.once(found.text, topic=found.topic)
 
     def _start_again(self, now: int) -> None:
         """At the first arrival, and when the session's time was set back: forget what is dated, keep track numbers."""

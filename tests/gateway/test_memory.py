@@ -153,3 +153,19 @@ def test_numbers_of_radar_tracks_are_forgotten_and_never_mixed_up(world: Any) ->
     again = world.heard([world.radar_plot(world.Course(), 50.0 + 0.4 * k, number=5) for k in range(5)])
     state, _ = pipeline.step(state, again)
     assert set(state.tracks.plots) & {key} == set()
+
+
+def test_of_many_aircraft_that_scatter_otherwise_than_stated_the_first_are_named(
+    world: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each of six scatters by 60 m where 15 are stated: two are named, then it is said once that there are more."""
+    monkeypatch.setattr(work, "NAMED_AT_MOST", 2)
+    random = np.random.default_rng(1)
+    said = [
+        world.report(world.Course(), t_s, aircraft=f"icao:{k:06x}", off_m=random.normal(0.0, 60.0, 3))
+        for t_s in np.arange(0.1, 60.0, 1.0).tolist()
+        for k in range(6)
+    ]
+    ran = world.run(said)
+    assert len(ran.said("its position scatters")) == 2
+    assert len(ran.said("more aircraft's positions scatter")) == 1
