@@ -110,7 +110,8 @@ COLUMNS = (
     "RMSE m",
 )
 NOTES = (
-    "inside the 95 % interval that chi-square gives; means for each degree of freedom, 1 = as told; 000's case in the plane",
+    "in: of the seconds, inside the 95 % interval that chi-square gives; 000's case in the plane",
+    "means for each degree of freedom, 1 = as told",
     "below: surer than told, the careful side",
 )
 
@@ -253,7 +254,7 @@ def _settings(runs: int, seed: int) -> tuple[Table, dict[str, float]]:
                     f"found {name}, {estimator}": share,
                     f"false {name}, {estimator}": 100.0 * len(wrong) / runs,
                 }
-    columns = ("003's approach", "estimator", "said in % of runs", "factor said", "other components in % of runs")
+    columns = ("003's approach", "estimator", "said %", "factor", "others %")
     return Table(f"what the program says of its own settings, {runs} runs", columns, tuple(rows)), figures
 
 
