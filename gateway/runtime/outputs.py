@@ -19,12 +19,14 @@ from gateway.runtime.urls import LinkError
 from gateway.settings import Site
 from gateway.sinks import Sink
 from gateway.sinks.arrow import ArrowSink
+from gateway.sinks.aside import Aside
 from gateway.sinks.parquet import SmoothedTable, finish
 from gateway.sinks.publish import PublishSink
 from gateway.sinks.rerun import RerunSink
 
 RRD_FILE = "session.rrd"
 _WATCHED = (0.4, 256)  # seconds and rows that are drawn at once, for people who look on
+_LIVE = (0.4, 16384)  # the same where drawing has a thread of its own and holds up nothing
 _TABLES_WATCHED_S = 1.0  # of rows that a kill may cost
 _UNWATCHED = (30.0, 4096)  # where a recording is replayed as fast as it goes: fewer, larger batches cost less
 
@@ -55,7 +57,7 @@ class Outputs:
             self._sinks.append(ArrowSink(folder, geoid_separation_m=separation_m, period_s=period_s))
         if folder is not None or setup.serve is not None:
             self._rerun = _rerun(site, folder, setup)
-            self._sinks.append(self._rerun)
+            self._sinks.append(Aside(self._rerun) if setup.live else self._rerun)
         self._smoothing = Smoothing(site, setup.options, folder) if setup.smooth else None
 
     @property
@@ -142,7 +144,7 @@ class Outputs:
 
 def _rerun(site: Site, folder: Path | None, setup: Setup) -> RerunSink:
     serve = setup.serve
-    period_s, rows_limit = _WATCHED if setup.is_watched else _UNWATCHED
+    period_s, rows_limit = _LIVE if setup.live else _WATCHED if setup.is_watched else _UNWATCHED
     try:
         return RerunSink(
             site,
