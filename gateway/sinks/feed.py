@@ -21,6 +21,7 @@ import rerun.blueprint as rrb
 from gateway.sinks.scene.entry import Always, Entry, send
 
 BATCHES_WAITING = 512  # for a viewer that stands still: some 200 s and 20 MB of them, then they are dropped
+ENTRIES_WAITING = 30_000  # and no more than these, where batches are those of a crowd
 KEPT_AT_MOST = 10_000  # looks and names that wait for it: of some thousand tracks
 _STREAM_HEADER = 12
 _MESSAGE_HEADER = struct.Struct("<QQ")
@@ -138,6 +139,7 @@ class ServedFeed:
             raise OSError(errno.EADDRINUSE, f"the viewer's server could not start on {host}:{port}") from error
         self._waiting: queue.Queue[Sequence[Entry] | None] = queue.Queue(BATCHES_WAITING)
         self._kept: list[Entry] = []
+        self._queued = self._taken = 0  # entries so far; each is counted by one thread alone
         self._thread = threading.Thread(target=self._run, name="viewer feed", daemon=True)
         self._thread.start()
 
@@ -145,7 +147,10 @@ class ServedFeed:
         """Queue entries for the viewers, or drop their rows if the queue is full."""
         batch = [*self._kept, *entries]
         try:
+            if self._queued - self._taken > ENTRIES_WAITING:
+                raise queue.Full
             self._waiting.put_nowait(batch)
+            self._queued += len(batch)
             self._kept = []
         except queue.Full:
             always: list[Entry] = [entry for entry in batch if isinstance(entry, Always)]
@@ -155,6 +160,7 @@ class ServedFeed:
     def _run(self) -> None:
         while (batch := self._waiting.get()) is not None:
             send(self._stream, batch)
+            self._taken += len(batch)
 
     def close(self) -> None:
         """Let the viewers have what waits, as long as they take it, and end the server."""

@@ -70,7 +70,10 @@ def test_without_a_server_there_is_no_address(tmp_path):
     sink.close()
 
 
-def test_a_viewer_that_takes_nothing_costs_rows_for_viewers_and_none_for_the_file(tmp_path, pictures, monkeypatch):
+@pytest.mark.parametrize("limit", [("BATCHES_WAITING", 8), ("ENTRIES_WAITING", 100)])
+def test_a_viewer_that_takes_nothing_costs_rows_for_viewers_and_none_for_the_file(
+    tmp_path, pictures, monkeypatch, limit
+):
     """The thread of the viewers stands still, as it does behind a stopped viewer; the file gets all."""
     go_on = threading.Event()
     sending = feed.send
@@ -81,7 +84,7 @@ def test_a_viewer_that_takes_nothing_costs_rows_for_viewers_and_none_for_the_fil
         sending(stream, entries)
 
     monkeypatch.setattr(feed, "send", stuck)
-    monkeypatch.setattr(feed, "BATCHES_WAITING", 8)
+    monkeypatch.setattr(feed, *limit)
     path: Path = tmp_path / "session.rrd"
     sink = RerunSink(DEMO_SITE, path=path, serve=("127.0.0.1", 0))
     made = pictures(30.0)
