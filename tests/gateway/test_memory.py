@@ -110,7 +110,7 @@ def test_a_track_keeps_so_many_states_and_no_more(world: Any, monkeypatch: pytes
 
 def test_more_aircraft_than_are_kept_are_counted(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Those that were there first stay; the others' reports are counted and that is said once."""
-    monkeypatch.setattr(work, "AIRCRAFT_AT_MOST", 3)
+    monkeypatch.setattr(arriving, "AIRCRAFT_AT_MOST", 3)
     course = world.Course()
     said = [world.report(course, t, aircraft=f"icao:{k:06x}") for t in (0.1, 1.1, 2.1) for k in range(5)]
     ran = world.run(said)

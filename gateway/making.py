@@ -1,0 +1,143 @@
+"""One step in the making: what it knows, and what has come of the arrivals so far."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from gateway import align, associate, fuse, predict, track
+from gateway.align import SECOND, Fix, Plot
+from gateway.associate import Change, Setting, Spans
+from gateway.frames import RadarFrame
+from gateway.fuse import Adopted, Ended, Lanes, LifeChange, Scene, Settled
+from gateway.fuse.filtering import Job
+from gateway.fuse.rows import Row
+from gateway.fuse.weighting import Model
+from gateway.observation import Heard, Truth
+from gateway.picture import Event, Health, Picture, SourceHealth
+from gateway.state import State
+
+SAID_AT_MOST = 500  # a bound on what strangers can make us remember
+NAMED_AT_MOST = 20  # sources with one trouble that are told by name
+
+
+class Making:
+    """The stages' parts of the state, what waits to be worked, and what is to be drawn of it all."""
+
+    def __init__(self, state: State, heard: Sequence[Heard]) -> None:
+        self.before, self.heard = state, heard
+        self.site, self.options, self.frame = state.site, state.options, state.frame
+        self.radars, self.geoid, self.tracks = state.radars, state.geoid, state.tracks
+        self.association, self.registration, self.lanes = state.association, state.registration, state.lanes
+        self.now, self.instant, self.serial = state.now, state.instant, state.serial
+        self.counters, self.said, self.reported = dict(state.counters), state.said, state.reported
+        self.consistency = state.consistency
+        self.history = int(state.options.history_s * SECOND)
+        self.wait = int(state.options.association_wait_s * SECOND)
+        self._see_radars()
+        self.fixes: list[Fix] = []
+        self.plots: list[Plot] = []
+        self.checks: list[associate.Check] = []
+        self.changes: list[Change] = []
+        self.rows: list[Row] = []
+        self.ended: list[Ended] = []
+        self.lived: list[LifeChange] = []
+        self.settled: list[Settled] = []
+        self.forecasts: list[predict.Forecast] = []
+        self.events: list[Event] = []
+        self.jobs: dict[int, Job] = {}
+        self._both: tuple[Spans, tuple[Adopted, ...], Spans] = (Spans(), (), Spans())
+        self.untracked = 0
+
+    def _work_in(self, lanes: Lanes, job: Job | None) -> None:
+        """A job, to be worked together with those of other tracks."""
+        self.lanes = lanes
+        if job is not None:
+            self.jobs[job.track] = job
+
+    def _settle(self, lane: int | None = -1) -> None:
+        """Work the waiting jobs, if this track is among them (-1: in any case); rows come in order of arrival."""
+        if not self.jobs or (lane != -1 and lane not in self.jobs):
+            return
+        jobs, self.jobs = list(self.jobs.values()), {}
+        separation_m = self.geoid.separation_m
+        self.lanes, rows, fresh = fuse.work(self.lanes, jobs, self._spans, separation_m, self.model)
+        self.rows += rows
+        self.consistency = self.consistency.hearing(event for _, event in fresh)
+        outliers = sum(event.outlying for _, event in fresh)
+        if outliers:
+            self.count("outliers, their pull bounded", outliers)
+        for number, event in fresh:
+            if event.restarted is not None:
+                self.count("restarted after divergence")
+                self.events.append(Event(event.at, "warning", f"track {number} started again: {event.restarted}"))
+
+    def _scene(self) -> Scene:
+        return Scene(self.tracks, self._spans, self.options)
+
+    @property
+    def _spans(self) -> Spans:
+        """Which radar track is which aircraft when: as associated, and where a new number goes on with an old one."""
+        found, adopted = self.association.ledger.spans, self.lanes.adopted
+        if not adopted:
+            return found
+        if found is not self._both[0] or adopted is not self._both[1]:
+            self._both = found, adopted, fuse.spans_with(found, adopted)
+        return self._both[2]
+
+    def _see_radars(self) -> None:
+        self.radar_frames = {number: RadarFrame.of(radar, self.frame) for number, radar in self.radars.items()}
+        self.model = Model.of(self.options, self.site.position, self.radar_frames, self.site.estimation)
+        self.setting = Setting(self.site, self.options, self.frame, self.radar_frames)
+
+    def count(self, reason: str, by: int = 1) -> None:
+        """One more for a reason."""
+        self.counters[reason] = self.counters.get(reason, 0) + by
+
+    def once(self, text: str, level: str = "warning", topic: str = "") -> None:
+        """Say something, the first time only; of a topic only the first, whatever numbers are in it."""
+        about = topic or text
+        if about not in self.said and len(self.said) < SAID_AT_MOST:
+            self.said |= {about}
+            self.events.append(Event(self.now or 0, level, text))
+
+    def picture(self, health: Health) -> tuple[State, Picture]:
+        """The new state and its picture."""
+        self._settle()
+        state = State(
+            self.site,
+            self.options,
+            self.frame,
+            self.radars,
+            self.geoid,
+            self.tracks,
+            self.association,
+            self.registration,
+            self.lanes,
+            self.now,
+            self.instant,
+            self.serial,
+            self.before.steps + 1,
+            self.counters,
+            self.said,
+            self.reported,
+            self.consistency,
+        )
+        observations = tuple(observation for arrival in self.heard for observation in arrival.observations)
+        own = SourceHealth("gateway", "pipeline", 0.0, 0.0, 0, tuple(sorted(self.counters.items())))
+        table = fuse.table(self.rows, self.ended, self.lived, self.frame, self.model)
+        picture = Picture(
+            step=self.before.steps,
+            now=self.now or 0,
+            observations=observations,
+            align=align.draw(self.fixes, self.plots, self.frame, self.radar_frames),
+            track=track.table(self.tracks, self.untracked),
+            associate=associate.table(self.checks, self.association.ledger, self.changes),
+            register=self.registration.table(self.radars),
+            fuse=replace(table, settled=tuple(self.settled)),
+            predict=predict.table(self.forecasts, self.frame),
+            truth=tuple(observation for observation in observations if isinstance(observation, Truth)),
+            health=replace(health, sources=(*health.sources, own)),
+            events=tuple(self.events),
+        )
+        return state, picture
