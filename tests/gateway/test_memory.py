@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gateway import pipeline, track, work
+from gateway import arriving, pipeline, track, work
 from gateway.align import SECOND
 from gateway.fuse import lanes, life
 from gateway.observation import Heard, Observation, RadarStatus
