@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,8 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-_GIVEN_WAY_S = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,21 +79,10 @@ def rows(path: str, time: ArrayLike, step: ArrayLike, *columns: Iterable[Any]) -
 
     The rows must come in the order of time already: see `in_order`.
     """
-    give_way()
     flat = tuple(_Column(one.component_descriptor(), one.as_arrow_array()) for part in columns for one in part)
     at, number = np.asarray(time, dtype=np.int64), np.asarray(step, dtype=np.int64)
     utc, count = pa.array(at.view("datetime64[ns]"), pa.timestamp("ns")), pa.array(number, pa.int64())
     return Rows(path, at, number, (_Index("utc", utc), _Index("step", count)), flat)
-
-
-def give_way() -> None:
-    """Let other threads have a turn, where we are not the main one: the session must not wait until all is drawn.
-
-    The interpreter takes a turn away from who has it after a millisecond. A thread that sleeps after every entity leaves
-    the session most of the time, one that draws on leaves it half.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        time.sleep(_GIVEN_WAY_S)
 
 
 def once(path: str, time: int, step: int, *columns: Iterable[Any]) -> Rows:
@@ -132,7 +117,6 @@ def in_order(time: Ints) -> NDArray[np.intp]:
 def send(recording: rr.RecordingStream, entries: Sequence[Entry]) -> None:
     """Hand entries to a recording stream, in their order."""
     for entry in entries:
-        give_way()
         if isinstance(entry, Always):
             recording.log(entry.path, *entry.archetypes, static=True)
         else:
