@@ -160,7 +160,7 @@ class Work(Arriving):
     # register -----------------------------------------------------------------------------------------------------
 
     def register(self) -> None:
-        """Nothing is learnt yet: the correction that align takes off stays what it was, none."""
+        """Nothing is learnt while a session runs: what the site file says of a radar is what align takes off."""
 
     # fuse ---------------------------------------------------------------------------------------------------------
 
