@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from gateway.offline.pairing import Gathering
     from gateway.offline.registration import Result
     from gateway.runtime.playback import Playback
-    from gateway.settings import Site
+    from gateway.runtime.setup import Place
 
 _HELP = """
 Find the systematic errors of the radars of a recording, or of an archived session: how much range, azimuth, elevation and
@@ -73,32 +73,14 @@ def find_errors(
     json: take.JsonOption = False,
 ) -> None:
     """Find the errors of radars."""
-    from adapters.files import FileError
-    from gateway.cli.progress import progressing
     from gateway.estimators.registration_frames import SYSTEMS
-    from gateway.offline.pairing import Gathering
     from gateway.offline.registration import LEAST_PAIRS, method_for, registered, site_with
-    from gateway.runtime.folder import FolderError
-    from gateway.runtime.playback import open_playback
-    from gateway.runtime.setup import RunFailure
     from gateway.settings import format_site
 
     system = next((one for one in SYSTEMS if one == frame), None)
     if system is None:
         raise UsageError(f"--frame {frame!r} is none of {', '.join(SYSTEMS)}.")
-    place = take.read_place(site)
-    try:
-        playback = open_playback(files)
-        found = place or playback.place or playback.find_place()
-        if found is None:
-            raise UsageError("Nothing in this recording tells where the runway is; give a site file with --site.")
-        gathering = Gathering(found.site)
-        with progressing("pairing", show=not quiet) as tell:
-            _gather(playback, found.site, gathering, tell)
-    except (FileError, FolderError) as error:
-        raise UsageError(str(error)) from error
-    except RunFailure as failure:
-        raise RunError(str(failure)) from failure
+    gathering = _gathered(files, site, quiet)
     method = method_for(gathering, system, iterations, literal=literal)
     result = registered(gathering, method)
     if result is None:
@@ -110,27 +92,50 @@ def find_errors(
     if len(files) == 1 and files[0].is_dir():
         _write(files[0] / RESULT_FILE, text.dumps(document, indent=1) + "\n")
     if write_site is not None:
-        _write(write_site, format_site(site_with(found.site, gathering.radars, result)))
+        _write(write_site, format_site(site_with(gathering.site, gathering.radars, result)))
     if json:
         print(text.dumps(document))
     elif not quiet:
         _show(result)
 
 
-def _gather(playback: Playback, site: Site, gathering: Gathering, tell: Callable[[float], None]) -> None:
+def _gathered(files: list[Path], site: Path | None, quiet: bool) -> Gathering:
+    """The pairs of a recording or session."""
+    from adapters.files import FileError
+    from gateway.cli.progress import progressing
+    from gateway.offline.pairing import Gathering
+    from gateway.runtime.folder import FolderError
+    from gateway.runtime.playback import open_playback
+    from gateway.runtime.setup import RunFailure
+
+    place = take.read_place(site)
+    try:
+        playback = open_playback(files)
+        found = place or playback.place or playback.find_place()
+        if found is None:
+            raise UsageError("Nothing in this recording tells where the runway is; give a site file with --site.")
+        gathering = Gathering(found.site)
+        with progressing("pairing", show=not quiet) as tell:
+            _gather(playback, found, gathering, tell)
+    except (FileError, FolderError) as error:
+        raise UsageError(str(error)) from error
+    except RunFailure as failure:
+        raise RunError(str(failure)) from failure
+    return gathering
+
+
+def _gather(playback: Playback, place: Place, gathering: Gathering, tell: Callable[[float], None]) -> None:
     """Run the recording through the picture, and gather pairs on the way."""
     from gateway.picture import Picture
     from gateway.runtime.loop import run_replay
     from gateway.runtime.run import Run
-    from gateway.runtime.setup import Place, Setup
-    from gateway.settings import format_site
+    from gateway.runtime.setup import Setup
 
     def watch(run: Run, picture: Picture | None) -> None:
         if picture is not None:
             gathering.take(picture)
         tell(playback.fraction())
 
-    place = Place(site, format_site(site), "")
     run_replay(playback, Setup(place=place, options=playback.options, is_watched=False), watch=watch)
 
 

@@ -73,13 +73,7 @@ class Gathering:
             elif isinstance(one, RadarPlot) and one.track_number and one.radar in self.radars:
                 plot = place_plot(one, 0, self.radars[one.radar], _NOTHING)
                 plots = self._plots.setdefault(f"{one.radar}/{one.track_number}", deque())
-                if plots and plots[-1].at > plot.at:
-                    ordered = list(plots)
-                    insort(ordered, plot, key=lambda one: one.at)
-                    plots.clear()
-                    plots.extend(ordered)
-                else:
-                    plots.append(plot)
+                insort(plots, plot, key=lambda known: known.at)
         due = picture.now - int(WAIT_S * SECOND)
         while self._reports and self._reports[0].at <= due:
             self._pair(self._reports.popleft(), picture)

@@ -120,10 +120,12 @@ def site_with(site: Site, radars: Mapping[int, RadarSite], result: Result) -> Si
 
 def _columns(gathering: Gathering, numbers: list[int], names: tuple[str, ...]) -> Pairs:
     frame, rows = RunwayFrame(gathering.site.runway), gathering.pairs
+    place_of = {name: place for place, name in enumerate(names)}
+    radar_of = {number: place for place, number in enumerate(numbers)}
     sites = [gathering.radars[number] for number in numbers]
     antennas = np.array([RadarFrame.of(site, frame).antenna_enu_m for site in sites])
     radars = np.stack(frame.geodetic_from_enu(antennas), axis=-1)
-    which = np.array([numbers.index(pair.radar) for pair in rows], dtype=np.intp)
+    which = np.array([radar_of[pair.radar] for pair in rows], dtype=np.intp)
     boresight = np.array([site.compass_boresight_rad for site in sites])[which]
     polar = np.array([pair.polar for pair in rows])
     polar[:, 1] = boresight - polar[:, 1]
@@ -137,7 +139,7 @@ def _columns(gathering: Gathering, numbers: list[int], names: tuple[str, ...]) -
         geodetic,
         np.array([pair.sigma_m for pair in rows]),
         velocity,
-        np.array([names.index(pair.aircraft) for pair in rows], dtype=np.intp),
+        np.array([place_of[pair.aircraft] for pair in rows], dtype=np.intp),
         np.broadcast_to([gathering.site.runway.latitude_rad, gathering.site.runway.longitude_rad], (len(numbers), 2)),
     )
 

@@ -115,7 +115,8 @@ class Recorder:
         """Record many arrivals; those at the places `refused` apart."""
         for place in refused:
             self.refuse(arrivals[place])
-        kept = [one for place, one in enumerate(arrivals) if place not in refused] if refused else arrivals
+        apart = frozenset(refused)
+        kept = [one for place, one in enumerate(arrivals) if place not in apart] if apart else arrivals
         for source, some in groupby(kept, _SOURCE):
             self._pending[source] += some
 

@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from gateway.estimators.registration import Errors
-from gateway.estimators.registration_frames import SYSTEMS, difference
+from gateway.estimators.registration_frames import SYSTEMS, System, difference
 from sim.studies.registration import RADAR, RADAR_ERROR, SOURCE_ERROR, of_system, straight
 
 Floats = NDArray[np.float64]
@@ -77,11 +77,10 @@ def _equator_km(geodetic: Floats) -> Floats:
     return np.asarray(xy - xy.mean(axis=0))
 
 
-def _rounds(recording: rr.RecordingStream, system: str) -> None:
+def _rounds(recording: rr.RecordingStream, system: System) -> None:
     case = straight(10)
-    name = next(one for one in SYSTEMS if one == system)
     for rounds in ROUNDS:
-        left = case.remaining_m(of_system(name, rounds) if rounds else None)
+        left = case.remaining_m(of_system(system, rounds) if rounds else None)
         recording.set_time("round", sequence=rounds)
         for part, value in zip(("source", "radar"), left, strict=True):
             path = f"/rounds/{part}/{system}"
