@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+import warnings
+from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from rerun.chunk import RrdReader
 
 from gateway.align import Aligned
 from gateway.associate import Associated, Change
@@ -26,6 +31,7 @@ TICK_S = 0.2
 AIRCRAFT, RADAR_TRACK = "mavlink:1", "1/3"
 Floats = NDArray[np.float64]
 Make = Callable[..., list[Picture]]
+Entities = dict[str, list[dict[str, Any]]]
 
 
 def _course() -> tuple[Floats, Floats, Floats]:
@@ -240,3 +246,28 @@ def make_pictures(
 def pictures() -> Make:
     """A function that makes the pictures of a part of the approach."""
     return make_pictures
+
+
+def rows_of(path: Path) -> Entities:
+    """The rows of each entity in the order of time: component -> value, `utc` in ns; static rows have no `utc`."""
+    found: Entities = defaultdict(list)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that a file still open has no index
+        reader = RrdReader(path)
+    for chunk in reader.stream():
+        batch = chunk.to_record_batch()
+        columns = {name: batch.column(name) for name in batch.schema.names}
+        if "utc" in columns:
+            columns["utc"] = columns["utc"].cast("int64")
+        values = {name: column.to_pylist() for name, column in columns.items()}
+        for row in range(batch.num_rows):
+            found[chunk.entity_path].append({name: column[row] for name, column in values.items()})
+    for rows in found.values():
+        rows.sort(key=lambda row: (row.get("utc", 0), row["rerun.controls.RowId"]))
+    return found
+
+
+@pytest.fixture(scope="session")
+def read() -> Callable[[Path], Entities]:
+    """Reads a recording: see `rows_of`."""
+    return rows_of

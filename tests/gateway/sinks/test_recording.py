@@ -5,8 +5,6 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
-import warnings
-from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 import rerun as rr
-from rerun.chunk import RrdReader
 
 from gateway.frames import RunwayFrame
 from gateway.fuse import Ended, Fused
@@ -43,25 +40,6 @@ def record(path: Path, pictures: list, **options: Any) -> None:
     sink.close()
 
 
-def read(path: Path) -> Entities:
-    """The rows of each entity in the order of time: component -> value, `utc` in ns; static rows have no `utc`."""
-    found: Entities = defaultdict(list)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that a file still open has no index
-        reader = RrdReader(path)
-    for chunk in reader.stream():
-        batch = chunk.to_record_batch()
-        columns = {name: batch.column(name) for name in batch.schema.names}
-        if "utc" in columns:
-            columns["utc"] = columns["utc"].cast("int64")
-        values = {name: column.to_pylist() for name, column in columns.items()}
-        for row in range(batch.num_rows):
-            found[chunk.entity_path].append({name: column[row] for name, column in values.items()})
-    for rows in found.values():
-        rows.sort(key=lambda row: (row.get("utc", 0), row["rerun.controls.RowId"]))
-    return found
-
-
 def times(entities: Entities, path: str) -> list[int]:
     return [row["utc"] for row in entities[path] if "utc" in row]
 
@@ -71,7 +49,7 @@ def texts(entities: Entities) -> list[str]:
 
 
 @pytest.fixture
-def drawn(tmp_path, pictures) -> Entities:
+def drawn(tmp_path, pictures, read) -> Entities:
     record(tmp_path / "a.rrd", pictures(30.0))
     return read(tmp_path / "a.rrd")
 
@@ -87,7 +65,7 @@ def test_identities_with_colons_and_slashes_stay_one_part_of_a_path(drawn):
     assert "/raw/radar/1/3" in drawn
 
 
-def test_fused_rows_stand_in_the_runway_frame_and_on_the_map(tmp_path, pictures):
+def test_fused_rows_stand_in_the_runway_frame_and_on_the_map(tmp_path, pictures, read):
     made = pictures(10.0)
     record(tmp_path / "a.rrd", made)
     row = next(row for row in read(tmp_path / "a.rrd")["/fuse/1"] if "utc" in row)
@@ -100,7 +78,7 @@ def test_fused_rows_stand_in_the_runway_frame_and_on_the_map(tmp_path, pictures)
     assert row["Scalars:scalars"] == pytest.approx([np.hypot(east, north), -up])
 
 
-def test_a_row_of_the_past_is_not_drawn_over_a_newer_one(tmp_path, pictures):
+def test_a_row_of_the_past_is_not_drawn_over_a_newer_one(tmp_path, pictures, read):
     made = pictures(40.0)
     record(tmp_path / "a.rrd", made)
     written = np.concatenate([one.fuse.time for one in made])
@@ -110,7 +88,7 @@ def test_a_row_of_the_past_is_not_drawn_over_a_newer_one(tmp_path, pictures):
     assert drawn_at == expected.tolist()
 
 
-def test_how_pictures_fall_into_batches_changes_no_row(tmp_path, pictures):
+def test_how_pictures_fall_into_batches_changes_no_row(tmp_path, pictures, read):
     made = pictures(25.0)
     record(tmp_path / "a.rrd", made, period_s=0.4)
     record(tmp_path / "b.rrd", made, period_s=10.0, rows_limit=10_000)
@@ -121,7 +99,7 @@ def test_how_pictures_fall_into_batches_changes_no_row(tmp_path, pictures):
     assert small["/fuse/1/trail/0"][-1]["LineStrips3D:strips"] == large["/fuse/1/trail/0"][-1]["LineStrips3D:strips"]
 
 
-def test_the_trail_at_any_instant_ends_where_the_track_was(tmp_path, pictures):
+def test_the_trail_at_any_instant_ends_where_the_track_was(tmp_path, pictures, read):
     record(tmp_path / "a.rrd", pictures(150.0), period_s=10.0, rows_limit=10_000)
     entities = read(tmp_path / "a.rrd")
     for segment in ("0", "1"):
@@ -141,7 +119,7 @@ def test_the_point_of_association_is_marked_and_said(drawn):
     assert sum("mavlink:1 is radar track 1/3" in text for text in texts(drawn)) == 1
 
 
-def test_a_track_that_ends_is_said_and_leaves_the_scene(tmp_path, pictures):
+def test_a_track_that_ends_is_said_and_leaves_the_scene(tmp_path, pictures, read):
     record(tmp_path / "a.rrd", pictures(20.0, end=True))
     entities = read(tmp_path / "a.rrd")
     assert any("track 1 ended: no data for 30 s" in text for text in texts(entities))
@@ -150,7 +128,7 @@ def test_a_track_that_ends_is_said_and_leaves_the_scene(tmp_path, pictures):
     assert entities["/fuse/state/1"][-1]["StateChange:state"] == ["ended"]
 
 
-def test_a_track_that_ended_in_the_past_leaves_the_scene_after_its_last_row(tmp_path, pictures):
+def test_a_track_that_ended_in_the_past_leaves_the_scene_after_its_last_row(tmp_path, pictures, read):
     """An association found late ends a track at an instant that is older than rows already drawn."""
     made = pictures(20.0)
     ended = replace(made[-1].fuse, ended=(Ended(START + 16_000_000_000, 1, "joined track 2"),))
@@ -161,12 +139,12 @@ def test_a_track_that_ended_in_the_past_leaves_the_scene_after_its_last_row(tmp_
         assert entities[path][-1]["utc"] >= max(times(entities, path))
 
 
-def test_an_estimator_without_modes_draws_none(tmp_path, pictures):
+def test_an_estimator_without_modes_draws_none(tmp_path, pictures, read):
     record(tmp_path / "a.rrd", pictures(10.0, modes=False))
     assert not any(path.startswith("/fuse/modes") for path in read(tmp_path / "a.rrd"))
 
 
-def test_aviation_units_are_feet_and_knots(tmp_path, pictures):
+def test_aviation_units_are_feet_and_knots(tmp_path, pictures, read):
     site = replace(DEMO_SITE, units="aviation")
     record(tmp_path / "a.rrd", pictures(20.0), site=site)
     entities = read(tmp_path / "a.rrd")
@@ -179,7 +157,7 @@ def test_aviation_units_are_feet_and_knots(tmp_path, pictures):
     assert " kn " in label
 
 
-def test_a_position_without_a_full_place_is_left_out(tmp_path, pictures):
+def test_a_position_without_a_full_place_is_left_out(tmp_path, pictures, read):
     made = pictures(10.0)
     missing = sum(int(np.isnan(one.align.plot_runway_m).any(axis=1).sum()) for one in made)
     plots = sum(len(one.align.plot_time) for one in made)
@@ -188,7 +166,7 @@ def test_a_position_without_a_full_place_is_left_out(tmp_path, pictures):
     assert len(times(read(tmp_path / "a.rrd"), "/raw/radar/1/3")) == plots - missing
 
 
-def test_a_step_without_anything_is_drawn_without_complaint(tmp_path, pictures):
+def test_a_step_without_anything_is_drawn_without_complaint(tmp_path, pictures, read):
     picture = pictures(0.2)[0]
     nothing = replace(picture, observations=(), truth=(), events=(), fuse=empty(picture.fuse))
     record(tmp_path / "a.rrd", [nothing])
@@ -212,7 +190,7 @@ def test_the_glide_path_of_the_scene_meets_the_runway_at_the_aiming_point(drawn)
     assert np.radians([latitude, longitude]) == pytest.approx([expected[0][0], expected[1][0]], abs=1e-12)
 
 
-def test_a_session_that_was_killed_opens_and_lacks_at_most_the_last_second(tmp_path):
+def test_a_session_that_was_killed_opens_and_lacks_at_most_the_last_second(tmp_path, read):
     script = (
         "import os, sys, runpy; from pathlib import Path; from gateway.sinks.rerun import RerunSink\n"
         "from gateway.settings import DEMO_SITE\n"
@@ -229,7 +207,7 @@ def test_a_session_that_was_killed_opens_and_lacks_at_most_the_last_second(tmp_p
     assert max(times(read(path), "/health/mavlink\\:1")) >= START + 8_800_000_000
 
 
-def test_the_end_of_a_session_keeps_every_row_and_makes_the_file_smaller(tmp_path, pictures):
+def test_the_end_of_a_session_keeps_every_row_and_makes_the_file_smaller(tmp_path, pictures, read):
     path, before = tmp_path / "a.rrd", tmp_path / "before.rrd"
     sink = RerunSink(DEMO_SITE, path=path, period_s=0.4)
     for picture in pictures(30.2):
@@ -252,7 +230,7 @@ def test_what_is_no_recording_stays_as_it_is(tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["a.rrd"]
 
 
-def test_without_a_height_the_label_says_so_and_no_vertical_is_drawn(tmp_path, pictures):
+def test_without_a_height_the_label_says_so_and_no_vertical_is_drawn(tmp_path, pictures, read):
     """The track is drawn flat at the guess; its elevation, its vertical deviation and its sigma are not drawn at all."""
     made = []
     for picture in pictures(20.0, first_s=300.0):
@@ -281,7 +259,7 @@ def test_without_a_height_the_label_says_so_and_no_vertical_is_drawn(tmp_path, p
     assert set(shown) == {1}  # of elevation and azimuth, the latter
 
 
-def test_a_track_looks_as_sure_as_it_is(tmp_path, pictures):
+def test_a_track_looks_as_sure_as_it_is(tmp_path, pictures, read):
     """Tentative: dim, and said so. Confirmed: red. Coasting: pale, with how far off it may be in the label."""
     told = {}
     for life, state in (("tentative", "gps only"), ("confirmed", "fused"), ("coasting", "coasting")):

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from rerun.chunk import RrdReader
 
 from gateway.offline.pieces import chosen, joined
 from gateway.settings import DEMO_SITE
@@ -16,27 +14,10 @@ from gateway.sinks.parquet import finish
 from gateway.sinks.rerun import RerunSink
 
 
-def rows(path: Path) -> dict[str, list[dict[str, Any]]]:
-    """The rows of each entity, in the order of time."""
-    found: dict[str, list[dict[str, Any]]] = {}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that a file still open has no index
-        reader = RrdReader(path)
-    for chunk in reader.stream():
-        batch = chunk.to_record_batch()
-        columns = {name: batch.column(name) for name in batch.schema.names}
-        if "utc" in columns:
-            columns["utc"] = columns["utc"].cast("int64")
-        values = {name: column.to_pylist() for name, column in columns.items()}
-        for row in range(batch.num_rows):
-            found.setdefault(chunk.entity_path, []).append({name: column[row] for name, column in values.items()})
-    for entity in found.values():
-        entity.sort(key=lambda row: row.get("utc", 0))
-    return found
-
-
 @pytest.fixture(scope="module")
-def drawn(tmp_path_factory: pytest.TempPathFactory, pictures: Any) -> tuple[Any, dict[str, list[dict[str, Any]]]]:
+def drawn(
+    tmp_path_factory: pytest.TempPathFactory, pictures: Any, read: Any
+) -> tuple[Any, dict[str, list[dict[str, Any]]]]:
     """A session of 100 s whose rows are drawn as smoothed ones as well, in two pieces; and what is in its file."""
     made = pictures(100.0)
     path = tmp_path_factory.mktemp("drawn") / "a.rrd"
@@ -51,7 +32,7 @@ def drawn(tmp_path_factory: pytest.TempPathFactory, pictures: Any) -> tuple[Any,
         sink.write_smoothed(chosen(track, places), places)
     sink.end_smoothed(1, int(track.time[-1]) + 10**9, len(made))
     sink.close()
-    return track, rows(path)
+    return track, read(path)
 
 
 def test_each_row_stands_at_its_time_in_the_scene_and_on_the_map(drawn: Any) -> None:
