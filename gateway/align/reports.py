@@ -1,32 +1,22 @@
-"""Align: what was said, brought into the site's frames, and radar brought to the time of a GPS report.
-
-Positions of reports and plots become `Fix` and `Plot`: metres at the runway centre, and polar at the radar with what
-`register` learnt taken off. `bracket` interpolates a radar track at a GPS report's time, each component on its own.
-"""
+"""GPS reports as fixes: metres in the runway's ENU, with what is guessed of a height and of an accuracy that nobody told."""
 
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.frames import RadarFrame, RunwayFrame, turn, xyz_from_polar
+from gateway.frames import RunwayFrame, turn
 from gateway.geodesy import geodetic_to_ecef
-from gateway.observation import GpsReport, RadarPlot, RadarStatus, Timing
-from gateway.settings import RadarSite, Site
+from gateway.observation import GpsReport, Timing
+from gateway.settings import Site
 
 Floats = NDArray[np.float64]
-Correction = tuple[float, float, float, float]  # what is taken off: range m, azimuth rad, elevation rad, time s
-Polar = tuple[float, float, float]  # range m, azimuth rad, elevation rad; NaN = not measured
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
-SECOND = 1_000_000_000
 LEAST_POSITION_SIGMA_M = 0.3  # a receiver that claims less is describing its noise, not its error
 LEAST_VELOCITY_SIGMA_MPS = 0.1
 # Traffic that others pass on (its times are coarse) says its velocity as ADS-B does, whose lowest category is 10 m/s; MAVLink
@@ -72,32 +62,6 @@ class Fix:
     def has_height(self) -> bool:
         """Whether its height is measured."""
         return self.local is None or self.local.has_height
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Plot:
-    """A radar plot, corrected: range m, azimuth rad, elevation rad, NaN = not measured."""
-
-    at: int
-    serial: int
-    received_at: int
-    radar: int
-    number: int
-    polar: Polar
-    sigma: Polar
-
-
-@dataclass(frozen=True, slots=True)
-class Aligned:
-    """A step's raw positions in the runway frame: n reports (m) and m plots (m, NaN rows where a component is missing)."""
-
-    report_aircraft: tuple[str, ...]
-    report_time: Ints  # (n,) ns
-    report_runway_m: Floats  # (n, 3)
-    report_has_height: Bools  # (n,); without one the third coordinate is a guess
-    plot_radar_track: tuple[str, ...]  # "1/3"; "1/0" is a plot that the radar does not track
-    plot_time: Ints  # (m,) ns
-    plot_runway_m: Floats  # (m, 3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,109 +175,3 @@ def _speed_mps(report: GpsReport) -> float:
     if report.velocity_east_mps is None or report.velocity_north_mps is None:
         return UNKNOWN_SPEED_MPS
     return math.hypot(report.velocity_east_mps, report.velocity_north_mps)
-
-
-def place_plot(plot: RadarPlot, serial: int, radar: RadarSite, correction: Correction) -> Plot:
-    """A plot with its radar's errors taken off, and the site's sigmas where it gives none."""
-    measured = (plot.range_m, plot.azimuth_rad, plot.elevation_rad)
-    *errors, late_s = correction
-    distance, azimuth, elevation = (
-        math.nan if value is None else value - error for value, error in zip(measured, errors, strict=True)
-    )
-    sigma = (
-        plot.range_sigma_m or radar.range_sigma_m,
-        plot.azimuth_sigma_rad or radar.azimuth_sigma_rad,
-        plot.elevation_sigma_rad or radar.elevation_sigma_rad,
-    )
-    polar = (distance, azimuth, elevation)
-    at = plot.valid_at - round(late_s * SECOND)
-    return Plot(at, serial, plot.received_at, plot.radar, plot.track_number, polar, sigma)
-
-
-def radar_from_status(status: RadarStatus, frame: RunwayFrame) -> RadarSite:
-    """Where a radar says it stands, as a radar of the site file."""
-    x, y, z = frame.runway_from_geodetic(status.latitude_rad, status.longitude_rad, status.height_m).tolist()
-    return RadarSite(status.radar, x, y, z, status.compass_boresight_rad)
-
-
-def contradiction(known: RadarSite, said: RadarSite) -> str | None:
-    """How a radar's own word differs from the site file's by more than 30 m or 0.1 degrees, or None."""
-    off_m = math.dist(
-        (known.along_m, known.left_m, known.antenna_height_m), (said.along_m, said.left_m, said.antenna_height_m)
-    )
-    turned = math.degrees(math.remainder(said.compass_boresight_rad - known.compass_boresight_rad, 2.0 * math.pi))
-    parts = [f"stands {off_m:.0f} m elsewhere"] * (off_m > 30.0)
-    parts += [f"looks {turned:+.2f} degrees further right"] * (abs(turned) > 0.1)
-    return " and ".join(parts) or None
-
-
-def bracket(plots: Sequence[Plot], at: int, wait_s: float, back_s: float = 3.0) -> tuple[Polar, Polar]:
-    """One radar track's range, azimuth, elevation at an instant, and their sigmas; NaN where nothing is near.
-
-    `plots` in order of time. Each component is interpolated between the plots on both sides that have it (no later than
-    `wait_s` after the instant, no earlier than `back_s` before); extrapolated from the two before it if none follows.
-    Sigmas are those of the weights used, so an extrapolation says how bad it is (2.2 to 2.6 times an interpolation).
-    Source: 003 2.1.
-    """
-    middle = bisect_right(plots, at, key=_at)
-    first, last = at - int(back_s * SECOND), at + int(wait_s * SECOND)
-    range_, azimuth, elevation = (_component(plots, middle, at, first, last, component) for component in range(3))
-    return (range_[0], azimuth[0], elevation[0]), (range_[1], azimuth[1], elevation[1])
-
-
-def _component(
-    plots: Sequence[Plot], middle: int, at: int, first: int, last: int, component: int
-) -> tuple[float, float]:
-    """One component at an instant and its sigma; `middle` is the first plot after the instant."""
-    before: list[Plot] = []
-    for place in range(middle - 1, -1, -1):
-        if plots[place].at < first or len(before) == 2:
-            break
-        if not math.isnan(plots[place].polar[component]):
-            before.append(plots[place])
-    if not before:
-        return math.nan, math.nan
-    newest = before[0]
-    after = None
-    for place in range(middle, len(plots)):
-        if plots[place].at > last:
-            break
-        if not math.isnan(plots[place].polar[component]):
-            after = plots[place]
-            break
-    if newest.at == at:
-        return newest.polar[component], newest.sigma[component]
-    one, other = (newest, after) if after is not None else (before[-1], newest)
-    if one.at == other.at:  # one old plot alone says where the target is only for a moment
-        near = at - newest.at <= SECOND // 2
-        return (newest.polar[component], newest.sigma[component]) if near else (math.nan, math.nan)
-    weight = (at - one.at) / (other.at - one.at)
-    change = other.polar[component] - one.polar[component]
-    if component == 1:
-        change = math.remainder(change, 2.0 * math.pi)
-    sigma = math.hypot((1.0 - weight) * one.sigma[component], weight * other.sigma[component])
-    return one.polar[component] + weight * change, sigma
-
-
-def _at(plot: Plot) -> int:
-    return plot.at
-
-
-def draw(fixes: Sequence[Fix], plots: Sequence[Plot], frame: RunwayFrame, radars: Mapping[int, RadarFrame]) -> Aligned:
-    """The fixes and plots of a step as columns in the runway frame."""
-    report_m = np.array([fix.enu_m for fix in fixes]).reshape(-1, 3)
-    plot_m = np.full((len(plots), 3), math.nan)
-    for number, radar in radars.items():
-        rows = [row for row, plot in enumerate(plots) if plot.radar == number]
-        if rows:
-            polar = np.array([plots[row].polar for row in rows])
-            plot_m[rows] = turn(frame.runway_from_enu, radar.to_enu(xyz_from_polar(polar)))
-    return Aligned(
-        report_aircraft=tuple(fix.aircraft for fix in fixes),
-        report_time=np.array([fix.at for fix in fixes], dtype=np.int64),
-        report_runway_m=turn(frame.runway_from_enu, report_m),
-        report_has_height=np.array([fix.has_height for fix in fixes], dtype=np.bool_),
-        plot_radar_track=tuple(f"{plot.radar}/{plot.number}" for plot in plots),
-        plot_time=np.array([plot.at for plot in plots], dtype=np.int64),
-        plot_runway_m=plot_m,
-    )
