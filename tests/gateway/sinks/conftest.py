@@ -218,7 +218,7 @@ class _Maker:
             align=self.aligned(time_s, gps, radar),
             track=Tracked((RADAR_TRACK,), 0),
             associate=self.associated(time_s, gps, True),
-            register=Registered((1,), np.zeros((1, 4))),
+            register=Registered.untold((1,), np.zeros((1, 4))),
             fuse=fused,
             predict=predicted,
             truth=(truth,) if step % 5 == 0 else (),

@@ -12,17 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.align import Correction
+from gateway.register.registered import EACH, Registered, Residuals
 from gateway.settings import RadarSite
 
 Floats = NDArray[np.float64]
 
-
-@dataclass(frozen=True, slots=True)
-class Registered:
-    """What is taken off each radar's measurements: range m, azimuth rad, elevation rad, time s; one row a radar."""
-
-    radars: tuple[int, ...]
-    correction: Floats  # (r, 4)
+__all__ = ["Registered", "Registration", "Residuals"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,4 +31,5 @@ class Registration:
     def table(self, radars: Mapping[int, RadarSite]) -> Registered:
         """What is taken off, as columns."""
         numbers = tuple(sorted(radars))
-        return Registered(numbers, np.array([self.of(radars[number]) for number in numbers]).reshape(-1, 4))
+        correction: Floats = np.array([self.of(radars[number]) for number in numbers]).reshape(-1, EACH)
+        return Registered.untold(numbers, correction)
