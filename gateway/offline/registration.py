@@ -9,57 +9,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.estimators import running_registration as running
+from gateway.estimators import registration_evidence as evidence
+from gateway.estimators import registration_solution as solution
 from gateway.estimators.registration import LITERAL, Errors, Method, Pairs, register
 from gateway.estimators.registration_frames import System, per_metre
 from gateway.frames import RadarFrame, RunwayFrame, polar_from_xyz, polar_jacobian, turn
 from gateway.fuse.weighting import polar_difference
 from gateway.offline.pairing import Gathering
+from gateway.register.verdicts import NAMES, Verdict
 from gateway.settings import RadarSite, Site, with_radar
 
 Floats = NDArray[np.float64]
 
 LEAST_PAIRS = 10
-SIGNIFICANT = 3.0
 PRIOR_CHI_SQUARE = 16.3  # three degrees of freedom, 99.9 %
-NAMES = ("range", "azimuth", "elevation", "time")
-UNITS = ("m", "degrees", "degrees", "ms")
-LIMITS = (15.0, math.radians(0.05), math.radians(0.05), 0.03)  # a larger sigma than this is worth no correction
-_PER_UNIT = (1.0, math.degrees(1.0), math.degrees(1.0), 1e3)
-_CLAIMED = ("measures {:.1f} m too far", "{:+.3f} degrees to the left", "{:+.3f} degrees too high", "{:+.0f} ms late")
-
-
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """One error of a radar: by how much it measures too much (azimuth to the left, time late; SI), and what that is worth."""
-
-    name: str
-    value: float
-    sigma: float
-    observable: bool
-
-    @property
-    def is_found(self) -> bool:
-        """Whether it is worth taking off."""
-        return self.is_told and abs(self.value) > SIGNIFICANT * self.sigma
-
-    @property
-    def is_told(self) -> bool:
-        """Whether the geometry tells it well enough to be worth a correction."""
-        return self.observable and self.sigma <= LIMITS[NAMES.index(self.name)]
-
-    def sentence(self) -> str:
-        """In plain words."""
-        place = NAMES.index(self.name)
-        per = _PER_UNIT[place]
-        sigma = f"+- {per * self.sigma:.{(1, 3, 3, 0)[place]}f}"
-        if not self.is_told:
-            return f"{self.name}: not observable from this geometry ({sigma} {UNITS[place]}): not to be applied"
-        if not self.is_found:
-            return (
-                f"{self.name}: nothing significant ({per * self.value:+.{(1, 3, 3, 0)[place]}f} {sigma} {UNITS[place]})"
-            )
-        return f"{self.name}: {_CLAIMED[place].format(per * self.value)} ({sigma}): to be applied"
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,12 +149,12 @@ def own_errors_m(gathering: Gathering) -> float:
     turns = np.array([frames[pair.radar].radar_from_enu for pair in rows])
     local = (turns @ (enu - np.array([frames[pair.radar].antenna_enu_m for pair in rows]))[..., None])[..., 0]
     by_enu = polar_jacobian(local) @ turns
-    off = polar_difference(polar_from_xyz(local), np.array([pair.polar for pair in rows]))
+    off = polar_difference(np.array([pair.polar for pair in rows]), polar_from_xyz(local))
     noise = by_enu * np.array([pair.sigma_m for pair in rows])[:, None, :]
     sigma = np.sqrt(np.array([pair.polar_sigma for pair in rows]) ** 2 + (noise * noise).sum(axis=-1))
     rates = (by_enu @ np.array([pair.velocity_enu_mps for pair in rows])[..., None])[..., 0]
-    seen = running.Pairs([pair.aircraft for pair in rows], [pair.radar for pair in rows], off, sigma, by_enu, rates)
-    solution: running.Solution | None = None
+    seen = evidence.Pairs([pair.aircraft for pair in rows], [pair.radar for pair in rows], off, sigma, by_enu, rates)
+    found: solution.Solution | None = None
     for _ in range(2):  # the second time with less weight for what is far off
-        solution = running.solved(running.learnt(running.Evidence(), seen, solution), usual)
-    return usual if solution is None else solution.own_sigma_m
+        found = solution.solved(evidence.learnt(evidence.Evidence(), seen, 0, found), usual)
+    return usual if found is None else found.own_sigma_m

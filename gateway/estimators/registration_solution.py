@@ -1,0 +1,252 @@
+"""The errors that evidence tells (`registration_evidence`): each aircraft's own error eliminated, its size found on the way.
+
+How large own errors are is found from how aircraft differ (expectation and maximisation). What geometry does not tell is
+flagged: a parameter with a part in a direction that is known 30 times worse than the best. Source: 004 2.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.estimators.registration_evidence import EACH, Evidence, Ints, Pairs
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+COMMON_SIGMA_M = 30.0  # prior of the position sources' common error, an axis
+NO_PRIOR_M = 1e5
+# Priors of radars so wide that they only keep the equations solvable, and of their clocks.
+RADAR_SIGMA = np.array([2000.0, 0.1, 0.1, 0.5])
+_OWN_LEAST_M = 1.0
+_OWN_ROUNDS = 12
+_OWN_FREEDOM = 3.0  # the prior of own errors' size weighs as much as one aircraft
+_WEAK = 1.0 / 30.0**2  # of the largest eigenvalue: geometry does not tell what lies along such a direction
+_SHARE = 0.2  # a parameter with more than this of a weak direction is not observable
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    """Errors of r radars (r, 4) and the common one (3,), by which they say too much; their covariance (p, p).
+
+    `own_sigma_m`: the size of own errors, an axis. `place_m`: (k, 3) of each aircraft the whole error of its position source,
+    with its covariance (k, 3, 3), and that with radars' errors and the common one, `across` (k, p, 3). `observable`: (r, 4)
+    whether geometry tells it. `prior_chi_square`: of the common error as the pairs alone tell it against its prior, 3 degrees.
+    """
+
+    radars: tuple[int, ...]
+    error: Floats
+    common_m: Floats
+    covariance: Floats
+    own_sigma_m: float
+    observable: Bools
+    condition: float
+    prior_chi_square: float
+    aircraft: dict[str, int]
+    place_m: Floats
+    place_variance: Floats
+    across: Floats
+
+    @property
+    def sigma(self) -> Floats:
+        """Of the radars' errors, (r, 4)."""
+        sigma = np.sqrt(np.maximum(np.diagonal(self.covariance), 0.0))
+        return np.asarray(sigma[:-3].reshape(-1, EACH))
+
+    @property
+    def common_sigma_m(self) -> Floats:
+        """Of the common error, (3,)."""
+        return np.sqrt(np.maximum(np.diagonal(self.covariance)[-3:], 0.0))
+
+    def left(self, pairs: Pairs) -> tuple[Floats, Floats]:
+        """How far pairs are (n, 3) from what is expected, each aircraft's own error included; and the variance of that.
+
+        Of a radar that was not heard before nothing is expected: then it is nothing, of infinite variance.
+        """
+        radar_of = {radar: place for place, radar in enumerate(self.radars)}
+        radar = np.array([radar_of.get(one, -1) for one in pairs.radar], np.intp)
+        who = np.array([self.aircraft.get(one, -1) for one in pairs.aircraft], np.intp)
+        rows, known = pairs.rows(), radar >= 0
+        error = np.concatenate([self.error[radar], np.concatenate([self.place_m, self.common_m[None]])[who]], axis=1)
+        variance = np.nan_to_num(pairs.sigma, nan=1.0) ** 2
+        variance += (rows @ self._spread(radar, who) * rows).sum(axis=-1)
+        return pairs.off - (rows * error[:, None, :]).sum(axis=-1), np.where(known[:, None], variance, math.inf)
+
+    def _spread(self, radar: NDArray[np.intp], who: NDArray[np.intp]) -> Floats:
+        """How well radars' errors and the places of aircraft (-1: one not seen before) are known together, (n, 7, 7)."""
+        unknown = self.covariance[-3:, -3:] + np.eye(3) * self.own_sigma_m**2
+        of_radar = EACH * radar[:, None] + np.arange(EACH)
+        across = np.concatenate([self.across, self.covariance[None, :, -3:]])[who[:, None], of_radar]
+        spread = np.empty((len(radar), EACH + 3, EACH + 3))
+        spread[:, :EACH, :EACH] = self.covariance[of_radar[:, :, None], of_radar[:, None, :]]
+        spread[:, :EACH, EACH:], spread[:, EACH:, :EACH] = across, across.swapaxes(-1, -2)
+        spread[:, EACH:, EACH:] = np.concatenate([self.place_variance, unknown[None]])[who]
+        return spread
+
+
+def solved(evidence: Evidence, own_sigma_m: float, common_sigma_m: float = COMMON_SIGMA_M) -> Solution | None:
+    """The errors that the evidence tells; None without evidence. `own_sigma_m`: what own errors are expected to be, an axis."""
+    if not evidence.radars:
+        return None
+    equations = _Equations.of(evidence)
+    prior = np.concatenate([np.tile(RADAR_SIGMA**-2.0, len(evidence.radars)), np.full(3, common_sigma_m**-2.0)])
+    own = own_sigma_m
+    for _ in range(_OWN_ROUNDS):
+        information, vector = equations.without_own(own)
+        error, covariance = _inverted(information + np.diag(prior), vector)
+        place, variance, across = equations.places(error, covariance, own)
+        apart = place - error[-3:]
+        spread = float((apart * apart).sum()) + equations.spread(covariance, own)
+        known = _OWN_FREEDOM + 3.0 * len(equations.aircraft)
+        renewed = max(math.sqrt((_OWN_FREEDOM * own_sigma_m**2 + spread) / known), _OWN_LEAST_M)
+        done, own = abs(renewed - own) < 1e-3 * own, renewed
+        if done:
+            break
+    observable, condition = _told_by_geometry(information)
+    return Solution(
+        evidence.radars,
+        error[:-3].reshape(-1, EACH),
+        error[-3:],
+        covariance,
+        own,
+        observable[:-3].reshape(-1, EACH),
+        condition,
+        _against_prior(information, vector, prior, common_sigma_m),
+        {name: row for row, name in enumerate(equations.aircraft)},
+        place,
+        variance,
+        across,
+    )
+
+
+def folded(evidence: Evidence, before: int, own_sigma_m: float) -> Evidence:
+    """The evidence with aircraft that had no pair since an instant folded into one sum, their own errors eliminated."""
+    latest: dict[str, int] = {}
+    for (aircraft, _), last in zip(evidence.links, evidence.last.tolist(), strict=True):
+        latest[aircraft] = max(last, latest.get(aircraft, last))
+    gone = [place for place, (aircraft, _) in enumerate(evidence.links) if latest[aircraft] < before]
+    if not gone:
+        return evidence
+    stays = sorted(set(range(len(evidence.links))) - set(gone))
+    left, rest = _some(evidence, gone), _some(evidence, stays)
+    total, vector = _Equations.of(left).without_own(own_sigma_m)
+    return Evidence(
+        rest.links, rest.information, rest.vector, rest.last, evidence.radars, (total, vector), evidence.pairs
+    )
+
+
+def _some(evidence: Evidence, places: list[int]) -> Evidence:
+    return Evidence(
+        tuple(evidence.links[place] for place in places),
+        evidence.information[places],
+        evidence.vector[places],
+        evidence.last[places],
+        evidence.radars,
+        evidence.folded,
+        evidence.pairs,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Equations:
+    """Of k aircraft: of all radars' errors (k, q, q), (k, q); of its place (k, 3, 3), (k, 3); of both (k, q, 3)."""
+
+    aircraft: tuple[str, ...]
+    radars: Floats
+    by_radars: Floats
+    cross: Floats
+    place: Floats
+    by_place: Floats
+    folded: tuple[Floats, Floats]
+
+    @classmethod
+    def of(cls, evidence: Evidence) -> _Equations:
+        """Links put together by aircraft."""
+        names = tuple(dict.fromkeys(aircraft for aircraft, _ in evidence.links))
+        row_of = {name: row for row, name in enumerate(names)}
+        rows: Ints = np.array([row_of[aircraft] for aircraft, _ in evidence.links], np.int64)
+        size = EACH * len(evidence.radars)
+        firsts = np.array([evidence.radars.index(radar) * EACH for _, radar in evidence.links], np.int64)
+        columns = firsts[:, None] + np.arange(EACH)
+        radars, by_radars = np.zeros((len(names), size, size)), np.zeros((len(names), size))
+        cross = np.zeros((len(names), size, 3))
+        place, by_place = np.zeros((len(names), 3, 3)), np.zeros((len(names), 3))
+        # Each link is another (aircraft, radar), so that its radar's blocks are its own; places have several.
+        radars[rows[:, None, None], columns[:, :, None], columns[:, None, :]] = evidence.information[:, :EACH, :EACH]
+        by_radars[rows[:, None], columns] = evidence.vector[:, :EACH]
+        cross[rows[:, None], columns] = evidence.information[:, :EACH, EACH:]
+        np.add.at(place, rows, evidence.information[:, EACH:, EACH:])
+        np.add.at(by_place, rows, evidence.vector[:, EACH:])
+        return cls(names, radars, by_radars, cross, place, by_place, evidence.folded)
+
+    def _gain(self, own_m: float) -> tuple[Floats, Floats]:
+        """The inverse of what is known of each place about the common error, and what radars' errors do to it."""
+        apart: Floats = np.asarray(np.linalg.inv(self.place + np.eye(3) / own_m**2))
+        return apart, np.asarray(self.cross @ apart)
+
+    def without_own(self, own_m: float) -> tuple[Floats, Floats]:
+        """Information and vector of radars' errors and the common one, own errors of this size eliminated."""
+        apart, gain = self._gain(own_m)
+        weight = own_m**-2.0
+        total, vector = self.folded[0].copy(), self.folded[1].copy()
+        total[:-3, :-3] += (self.radars - gain @ self.cross.swapaxes(-1, -2)).sum(axis=0)
+        total[:-3, -3:] += weight * gain.sum(axis=0)
+        total[-3:, :-3] = total[:-3, -3:].T
+        shared = weight * (apart @ self.place).sum(axis=0)
+        total[-3:, -3:] += 0.5 * (shared + shared.T)
+        vector[:-3] += (self.by_radars - (gain @ self.by_place[..., None])[..., 0]).sum(axis=0)
+        vector[-3:] += weight * (apart @ self.by_place[..., None])[..., 0].sum(axis=0)
+        return total, vector
+
+    def places(self, error: Floats, covariance: Floats, own_m: float) -> tuple[Floats, Floats, Floats]:
+        """The whole error of each aircraft's source (k, 3), its covariance (k, 3, 3), and that with all others (k, p, 3)."""
+        apart, gain = self._gain(own_m)
+        by_radars = (self.cross.swapaxes(-1, -2) @ error[:-3, None])[..., 0]
+        place = (apart @ (self.by_place - by_radars + error[-3:] * own_m**-2.0)[..., None])[..., 0]
+        back = self._back(gain, apart, own_m)
+        across = (back @ covariance).swapaxes(-1, -2)
+        return place, apart + back @ across, across
+
+    def spread(self, covariance: Floats, own_m: float) -> float:
+        """The sum of the variances of all own errors."""
+        apart, gain = self._gain(own_m)
+        back = self._back(gain, apart, own_m)
+        back[:, :, -3:] -= np.eye(3)
+        own = apart + back @ covariance @ back.swapaxes(-1, -2)
+        return float(np.trace(own, axis1=-2, axis2=-1).sum())
+
+    def _back(self, gain: Floats, apart: Floats, own_m: float) -> Floats:
+        """How places follow radars' errors and the common one, (k, 3, p)."""
+        return np.concatenate([-gain.swapaxes(-1, -2), apart * own_m**-2.0], axis=-1)
+
+
+def _inverted(information: Floats, vector: Floats) -> tuple[Floats, Floats]:
+    """Solution and covariance, by the column-scaled equations."""
+    scale = 1.0 / np.sqrt(np.diagonal(information))
+    covariance = np.linalg.inv(information * scale[:, None] * scale) * scale[:, None] * scale
+    covariance = 0.5 * (covariance + covariance.T)
+    return covariance @ vector, covariance
+
+
+def _told_by_geometry(information: Floats) -> tuple[Bools, float]:
+    """Whether each parameter is told without priors, and the condition of the column-scaled equations."""
+    diagonal = np.diagonal(information)
+    told = diagonal > 0.0
+    scale = np.where(told, 1.0 / np.sqrt(np.where(told, diagonal, 1.0)), 0.0)
+    values, axes = np.linalg.eigh(information * scale[:, None] * scale)
+    most = max(float(values[-1]), 1e-300)
+    weak = values < most * _WEAK
+    blurred = ((np.abs(axes) > _SHARE) & weak[None, :]).any(axis=1)
+    return told & ~blurred, math.sqrt(most / max(float(values[0]), 1e-16 * most))
+
+
+def _against_prior(information: Floats, vector: Floats, prior: Floats, common_sigma_m: float) -> float:
+    """Chi-square, 3 degrees, of the common error as the pairs alone tell it."""
+    alone = prior.copy()
+    alone[-3:] = NO_PRIOR_M**-2.0
+    error, covariance = _inverted(information + np.diag(alone), vector)
+    spread = covariance[-3:, -3:] + np.eye(3) * common_sigma_m**2
+    return float(error[-3:] @ np.linalg.solve(spread, error[-3:]))
