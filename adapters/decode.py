@@ -19,12 +19,12 @@ What links lose (kernel drops, resynced bytes) is counted with the links.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import count
 from typing import Protocol
 
 import numpy as np
 
 from adapters import Arrival, Source, told
+from adapters.arrivals import Arrivals
 from adapters.epoch import SessionEpoch
 from adapters.frame_batches import MANY, NO_HEAD, Head, frame_of, heads_of, payload_of, places_of, wanted
 from adapters.gathering import PASSING, Gathered, Said
@@ -103,14 +103,14 @@ class Decoder:
         """The session's time of a stamp, ns since 1970 UTC."""
         return self._epoch.session_time(received_at)
 
-    def hear_many(self, arrivals: Sequence[Arrival], heads: Sequence[Head] | None = None) -> tuple[Said, list[int]]:
+    def hear_many(self, arrivals: Sequence[Arrival]) -> tuple[Said, list[int]]:
         """The same as to hear each of them, in less time: what those said that said anything, and which were refused.
 
         Of many, what no stage reads (attitudes, inertial samples, air data) comes together, as one Heard for all that was said
-        until something else was, or the second was over. `heads`: of each arrival, where `heads_of` was asked already.
+        until something else was, or the second was over.
         """
         if len(arrivals) >= MANY and self._signing is None:
-            return self._hear_together(arrivals, heads)
+            return self._hear_together(Arrivals.of(arrivals))
         said, refused = [], []
         for place, arrival in enumerate(arrivals):
             heard = self.hear(arrival)
@@ -120,10 +120,9 @@ class Decoder:
                 refused.append(place)
         return said, refused
 
-    def _hear_together(self, arrivals: Sequence[Arrival], known: Sequence[Head] | None) -> tuple[Said, list[int]]:
-        heads = heads_of([data for _, _, data, _ in arrivals]) if known is None else np.array(known, np.int64)
-        numbers = [number for _, number, _, _ in arrivals]
-        components, senders = count_unbroken(arrivals, numbers, heads, self._listened)
+    def _hear_together(self, arrivals: Arrivals) -> tuple[Said, list[int]]:
+        heads = heads_of(arrivals.data) if arrivals.heads is None else arrivals.heads
+        components, senders = count_unbroken(arrivals, heads, self._listened)
         left = np.flatnonzero(places_of(heads, self._which) | (senders < 0))
         passing = places_of(heads[left], self._passing) & (senders[left] >= 0)
         gathered, refused = Gathered(self._epoch, self._listened), list[int]()
@@ -144,8 +143,8 @@ class Decoder:
             if heard is not None:
                 gathered.said.append((place, heard))
         gathered.close()
-        for number, place in dict(zip(numbers, count(), strict=False)).items():
-            self._listened[number].last_heard = arrivals[place].received_at
+        for number, places in arrivals.by_source():
+            self._listened[number].last_heard = int(arrivals.received_at[places[-1]])
         return gathered.said, refused
 
     def _gather(self, gathered: Gathered, place: int, arrival: Arrival, component: Component, message: int) -> None:

@@ -45,6 +45,12 @@ class TlogWriter:
         self._sink.write((received_at // 1000).to_bytes(8, "big") + data)
 
 
+def tlog_records(received_at: NDArray[np.int64], frames: list[bytes]) -> list[bytes]:
+    """What TlogWriter writes, of many frames and their stamps at once."""
+    stamps: list[bytes] = (received_at // 1000).astype(">i8").view("V8").tolist()
+    return list(map(bytes.__add__, stamps, frames))
+
+
 @dataclass(slots=True)
 class _Stamps:
     """Makes the stamps of a file sane and strictly increasing."""

@@ -6,14 +6,14 @@ one would find out then is the last number, and how many frames there were of ea
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters import Arrival
+from adapters.arrivals import Arrivals, Integers
 from adapters.frame_batches import NO_HEAD, Heads
 from adapters.listening import Listened
 from adapters.vehicles import Component
@@ -30,28 +30,27 @@ class _Sent(NamedTuple):
     first: int
     runs_on: bool
 
-    def is_unbroken(self, arrivals: Sequence[Arrival]) -> bool:
+    def is_unbroken(self, arrivals: Arrivals) -> bool:
         """Whether all of it can be counted at once."""
         component = self.component
         return (
             component is not None
             and self.runs_on
             and component.sequence.goes_on(self.first)
-            and arrivals[int(self.places[-1])].received_at < component.rates.until
+            and arrivals.received_at[self.places[-1]] < component.rates.until
         )
 
 
 def count_unbroken(
-    arrivals: Sequence[Arrival], numbers: Sequence[int], heads: Heads, listened: Mapping[int, Listened]
+    arrivals: Arrivals, heads: Heads, listened: Mapping[int, Listened]
 ) -> tuple[list[Component], NDArray[np.int64]]:
     """Count the frames of all systems whose numbers run on: their components, and which of these sent each frame, else -1.
 
-    `numbers`, `heads`: the source and the head of each arrival, in the order of their stamps. Left alone are whole sources
-    of which anything has no head, and whole systems with a gap, a new component, components that share a counter, or rates
-    that are due.
+    `heads`: of each arrival. Left alone are whole sources of which anything has no head, and whole systems with a gap, a new
+    component, components that share a counter, or rates that are due.
     """
-    sent = list(_by_component(numbers, heads, listened))
-    broken = {numbers[place] for place in np.flatnonzero(heads == NO_HEAD).tolist()}
+    sent = list(_by_component(arrivals.source, heads, listened))
+    broken = set(arrivals.source[heads == NO_HEAD].tolist())
     uneven = {(one.source, one.system) for one in sent if not one.is_unbroken(arrivals)}
     components: list[Component] = []
     senders = np.full(len(arrivals), -1)
@@ -76,8 +75,8 @@ def count_unbroken(
     return components, senders
 
 
-def _by_component(numbers: Sequence[int], head: Heads, listened: Mapping[int, Listened]) -> Iterator[_Sent]:
-    senders = np.array(numbers, np.int64) << 16 | head >> 8 & 0xFFFF
+def _by_component(source: Integers, head: Heads, listened: Mapping[int, Listened]) -> Iterator[_Sent]:
+    senders = source << 16 | head >> 8 & 0xFFFF
     order = np.argsort(senders, kind="stable")
     senders, head = senders[order], head[order]
     sequence, messages = head & 255, head >> 24

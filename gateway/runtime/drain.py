@@ -21,6 +21,7 @@ import numpy as np
 
 from gateway.runtime.batches import MESSAGE, Datagrams, Envelopes
 from gateway.runtime.emptying import CONTROL_BYTES, HEADER, MESSAGE_BYTES, NAME_BYTES, READY
+from gateway.runtime.links import Chunks
 
 _PROGRAM = Path(__file__).with_name("emptying.py")
 _PIPE_BYTES = 1 << 20
@@ -106,9 +107,9 @@ class Drain:
             contents.append(held[at : at + size])
             at += size
         times, dropped = self._envelopes.told(messages, words)
-        return Datagrams(
-            contents, self._envelopes.senders(messages, held[names:controls]), times, dropped, is_full=True
-        )
+        rows = np.frombuffer(held, np.uint8, controls - names, names).reshape(count, NAME_BYTES)
+        sender, named = self._envelopes.senders(messages, rows)
+        return Datagrams(Chunks(contents, sender, named, times), dropped, is_full=True)
 
     def _next_bytes(self) -> bytes | None:
         """What the pipe holds; nothing: it has ended; None: not yet."""

@@ -7,14 +7,15 @@ link is one source. Frames are cut here and checked no further than the cutting 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from functools import partial
-from itertools import accumulate, islice, repeat
-from operator import itemgetter
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from adapters import Arrival, Source
-from adapters.frame_batches import MANY, NO_HEAD, Head, heads_of
+import numpy as np
+from numpy.typing import NDArray
+
+from adapters import Source
+from adapters.arrivals import Arrivals
+from adapters.frame_batches import MANY, NO_HEAD, heads_of
 from adapters.mavlink_frames import FrameScanner
 from gateway.runtime.allowed import Allowed
 from gateway.runtime.links import Chunks
@@ -45,11 +46,10 @@ class _Peer:
 
 
 class Taken(NamedTuple):
-    """The sources that are new, and arrivals in the order of their stamps; `heads` of each, where they are known of all."""
+    """The sources that are new, and arrivals in the order of their stamps."""
 
     sources: list[Source]
-    arrivals: list[Arrival]
-    heads: list[Head] | None = None
+    arrivals: Arrivals
 
 
 class Intake:
@@ -89,19 +89,23 @@ class Intake:
     def take(self, heard: Sequence[tuple[int, Chunks]]) -> Taken:
         """What one turn of all links (link number, chunks) brought."""
         sources, self._unannounced = self._unannounced, []
-        if len(heard) == 1 and (plain := self._take_plain(*heard[0])) is not None:
-            return Taken(sources, *plain)
-        instants: list[int] = []
+        count = sum(len(chunks.data) for _, chunks in heard)
+        if not count:
+            return Taken(sources, Arrivals.of(()))
+        instants = self._instants(heard)
+        if count >= MANY and (plain := self._take_plain(heard, instants)) is not None:
+            return Taken(sources, plain)
+        heard_at: list[int] = []
         numbers: list[int] = []
         contents: list[bytes] = []
         names: list[str] = []
-        for heard_at, link, name, data, stream in self._in_order(heard):
+        for at, link, name, data, stream in _in_order(heard, instants):
             peer = self._peers[link].get(name)
             if peer is None:
                 if stream is None and not self._may_be_heard(link, name):
                     continue
                 if link in self._radars:
-                    instants.append(heard_at)
+                    heard_at.append(at)
                     numbers.append(self._radars[link].number)
                     contents.append(data)
                     names.append(name)
@@ -118,49 +122,69 @@ class Intake:
                     continue
                 sources.append(peer.source)
             for frame in frames:
-                instants.append(heard_at)
+                heard_at.append(at)
                 numbers.append(peer.source.number)
                 contents.append(frame)
                 names.append("")
-        stamps = self._stamper.stamps(instants)
-        return Taken(sources, list(map(_ARRIVAL, zip(stamps, numbers, contents, names, strict=True))))
+        stamps = self._stamper.stamps(np.array(heard_at, np.int64))
+        return Taken(sources, Arrivals(stamps, np.array(numbers, np.int64), contents, names if any(names) else None))
 
-    def _take_plain(self, link: int, chunks: Chunks) -> tuple[list[Arrival], list[Head]] | None:
-        """The arrivals of many datagrams that are one good frame each, of peers that are sources: almost all there are
-        where thousands a second come; and their heads. None where anything else is among them.
+    def _instants(self, heard: Sequence[tuple[int, Chunks]]) -> NDArray[np.int64]:
+        """When each of all was heard; what one link says keeps its order whatever its stamps say."""
+        instants = self._stamper.heard(np.concatenate([chunks.kernel_utc_ns for _, chunks in heard]))
+        begin = 0
+        for _, chunks in heard:
+            of_link = instants[begin : begin + len(chunks.data)]
+            np.maximum.accumulate(of_link, out=of_link)
+            begin += len(chunks.data)
+        return instants
+
+    def _take_plain(self, heard: Sequence[tuple[int, Chunks]], instants: NDArray[np.int64]) -> Arrivals | None:
+        """The arrivals of datagrams that are one good frame each, of peers that are sources, and of radars' datagrams:
+        almost all there are where thousands a second come. None where anything else is among them.
         """
-        if len(chunks.data) < MANY or chunks.stream is not None or self._allowed.systems is not None:
+        numbers = []
+        for link, chunks in heard:
+            number = None if chunks.stream is not None else self._numbers_of(link, chunks)
+            if number is None:
+                return None
+            numbers.append(number)
+        source, data = np.concatenate(numbers), [one for _, chunks in heard for one in chunks.data]
+        heads, is_radar = (
+            heads_of(data),
+            np.repeat([link in self._radars for link, _ in heard], list(map(len, numbers))),
+        )
+        if self._allowed.systems is not None or ((heads == NO_HEAD) & ~is_radar).any():
             return None
-        numbers = list(map(self._numbers[link].get, chunks.peers))
-        if None in numbers or NO_HEAD in (heads := heads_of(chunks.data).tolist()):
-            return None
-        stamps = self._stamper.stamps(list(accumulate(self._stamper.heard(chunks.kernel_utc_ns), max)))
-        return list(map(_ARRIVAL, zip(stamps, numbers, chunks.data, repeat(""), strict=False))), heads  # type: ignore[arg-type]
+        peers = None
+        if is_radar.any():
+            peers = [name for link, chunks in heard for name in _named(chunks, link in self._radars)]
+        if len(heard) > 1:
+            order = np.argsort(instants, kind="stable")
+            places = order.tolist()
+            instants, source, heads, data = instants[order], source[order], heads[order], [data[one] for one in places]
+            peers = peers and [peers[one] for one in places]
+        return Arrivals(self._stamper.stamps(instants), source, data, peers, heads)
 
-    def tell(self, lines: Sequence[bytes]) -> tuple[list[Source], list[Arrival]]:
+    def _numbers_of(self, link: int, chunks: Chunks) -> NDArray[np.int64] | None:
+        """The source of each datagram; None where one of the senders is not known yet, or not allowed."""
+        senders, which = np.unique(chunks.sender, return_inverse=True)
+        names = [chunks.names[sender] for sender in senders.tolist()]
+        if link in self._radars:
+            all_may = all(map(self._allowed.hears_peer, names))
+            return np.full(len(which), self._radars[link].number) if all_may else None
+        numbers = [self._numbers[link].get(name, -1) for name in names]
+        return None if -1 in numbers else np.array(numbers, np.int64)[which]
+
+    def tell(self, lines: Sequence[bytes]) -> Taken:
         """What people told the gateway: its source, if it is the first time, and the lines as arrivals of now."""
         new = []
         if self._told is None:
             self._told = Source(self._next_number, "told", TOLD, "the command line")
             self._next_number += 1
             new.append(self._told)
-        number = self._told.number
-        stamps = self._stamper.stamps([self._stamper.now()] * len(lines))
-        return new, [Arrival(stamp, number, line) for stamp, line in zip(stamps, lines, strict=True)]
-
-    def _in_order(self, heard: Sequence[tuple[int, Chunks]]) -> Iterable[tuple[int, int, str, bytes, int | None]]:
-        """(heard at, link, peer, data, stream) over all links by time; what one link says keeps its order whatever its
-        stamps say.
-        """
-        kernel = [instant for _, chunks in heard for instant in chunks.kernel_utc_ns]
-        instants = iter(self._stamper.heard(kernel))
-        timed: list[tuple[int, int, str, bytes, int | None]] = []
-        for link, chunks in heard:
-            rising = accumulate(islice(instants, len(chunks.data)), max)
-            timed += zip(rising, repeat(link), chunks.peers, chunks.data, repeat(chunks.stream), strict=False)
-        if len(heard) > 1:
-            timed.sort(key=itemgetter(0))  # stable
-        return timed
+        stamps = self._stamper.stamps(np.full(len(lines), self._stamper.now()))
+        return Taken(new, Arrivals(stamps, np.full(len(lines), self._told.number), list(lines)))
 
     def _may_be_heard(self, link: int, name: str) -> bool:
         """Whether the datagrams of this peer may be; counts those that may not."""
@@ -201,5 +225,18 @@ class Intake:
         return source
 
 
-_ARRIVAL: Callable[[tuple[int, int, bytes, str]], Arrival] = partial(tuple.__new__, Arrival)
-"""Makes an Arrival of a tuple at a third of what its constructor takes, for each of tens of thousands a second."""
+def _in_order(
+    heard: Sequence[tuple[int, Chunks]], instants: NDArray[np.int64]
+) -> Iterable[tuple[int, int, str, bytes, int | None]]:
+    """(heard at, link, peer, data, stream) over all links by time."""
+    links = [link for link, chunks in heard for _ in chunks.data]
+    names = [name for _, chunks in heard for name in chunks.peers]
+    data = [(one, chunks.stream) for _, chunks in heard for one in chunks.data]
+    times = instants.tolist()
+    for place in np.argsort(instants, kind="stable").tolist():
+        yield times[place], links[place], names[place], *data[place]
+
+
+def _named(chunks: Chunks, are_named: bool) -> list[str]:
+    """Who sent each: of a radar link, which is one source whoever speaks on it; else nobody, as the source is the peer."""
+    return chunks.peers if are_named else [""] * len(chunks.data)

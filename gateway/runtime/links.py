@@ -8,8 +8,12 @@ from __future__ import annotations
 
 import socket
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gateway.runtime.urls import LinkError, Url
 
@@ -20,14 +24,45 @@ RECEIVE_BUFFER_BYTES = 4 << 20
 class Chunks:
     """What one link has heard at once, in columns, because tens of thousands a second come: datagrams, or pieces of a stream.
 
-    `peers` tells the senders of one link apart; `kernel_utc_ns` is the kernel's time of arrival where the platform tells
-    it; `stream` numbers the connections of a byte stream (None: datagrams).
+    `sender` tells the senders of one link apart, and `names` names them; `kernel_utc_ns` is the kernel's time of arrival,
+    0 where the platform does not tell it; `stream` numbers the connections of a byte stream (None: datagrams).
     """
 
-    peers: list[str]
     data: list[bytes]
-    kernel_utc_ns: list[int | None]
-    stream: int | None
+    sender: NDArray[np.int64]
+    names: Mapping[int, str]
+    kernel_utc_ns: NDArray[np.int64]
+    stream: int | None = None
+
+    @classmethod
+    def of(cls, peers: Sequence[str], data: list[bytes], kernel: Sequence[int], stream: int | None = None) -> Chunks:
+        """The same from lists: the sender's name and the kernel's time (or 0) of each."""
+        numbers = {name: number for number, name in enumerate(dict.fromkeys(peers))}
+        sender = np.fromiter((numbers[name] for name in peers), np.int64, len(peers))
+        return cls(data, sender, dict(enumerate(numbers)), np.array(kernel, np.int64), stream)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Chunks]) -> Chunks:
+        """Some after the others, in one: of one link, whose senders keep their numbers, and one connection at most."""
+        if not parts:
+            return cls.of((), [], ())
+        if len(parts) == 1:
+            return parts[0]
+        names = parts[0].names
+        if any(part.names is not names for part in parts):
+            names = {number: name for part in parts for number, name in part.names.items()}
+        return cls(
+            [one for part in parts for one in part.data],
+            np.concatenate([part.sender for part in parts]),
+            names,
+            np.concatenate([part.kernel_utc_ns for part in parts]),
+            parts[0].stream,
+        )
+
+    @property
+    def peers(self) -> list[str]:
+        """The name of each one's sender."""
+        return [self.names[number] for number in self.sender.tolist()]
 
 
 class Link(Protocol):

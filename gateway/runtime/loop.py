@@ -114,7 +114,7 @@ def _tick(receiver: Receiver, run: Run, watch: Watch, manners: Manners | None, *
     for source in delivery.sources:
         run.add(source)
     run.count(receiver.counters() if manners is None else receiver.counters() | manners.counters)
-    watch(run, run.work(delivery.arrivals, delivery.watermark, notes, delivery.heads))
+    watch(run, run.work(delivery.arrivals, delivery.watermark, notes))
     return len(delivery.arrivals)
 
 

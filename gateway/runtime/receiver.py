@@ -13,8 +13,8 @@ from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from adapters import Arrival, Source
-from adapters.frame_batches import Head
+from adapters import Source
+from adapters.arrivals import Arrivals
 from gateway.runtime.allowed import Allowed
 from gateway.runtime.intake import Intake
 from gateway.runtime.links import Link
@@ -31,15 +31,11 @@ QUEUE_ARRIVALS = 200_000  # some 60 MB, and 20 s of the fastest stream measured
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """What came since the last hand-over. `notes` are (level, text), to be told to a person once.
-
-    `heads`: of each arrival, as `heads_of` has them, where the cutting of the frames has found them for all.
-    """
+    """What came since the last hand-over. `notes` are (level, text), to be told to a person once."""
 
     watermark: int
     sources: tuple[Source, ...] = ()
-    arrivals: list[Arrival] = field(default_factory=list)
-    heads: list[Head] | None = None
+    arrivals: Arrivals = field(default_factory=lambda: Arrivals.of(()))
     notes: tuple[tuple[str, str], ...] = ()
 
 
@@ -70,8 +66,8 @@ class Receiver:
         self._unsent: Counter[str] = Counter()
         self._told: deque[bytes] = deque()
         self._new_sources: list[Source] = []
-        self._arrivals: list[Arrival] = []
-        self._heads: list[Head] | None = []
+        self._arrivals: list[Arrivals] = []
+        self._waiting = 0  # arrivals
         self._notes: list[tuple[str, str]] = []
         self.started_at = self._watermark = self._stamper.watermark()  # before the first arrival, ns since 1970 UTC
         self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
@@ -86,9 +82,9 @@ class Receiver:
             raise self._failure
         with self._lock:
             sources, notes = tuple(self._new_sources), tuple(self._notes)
-            delivery = Delivery(self._watermark, sources, self._arrivals, self._heads, notes)
-            self._new_sources, self._arrivals, self._heads, self._notes = [], [], [], []
-        return delivery
+            watermark, arrivals = self._watermark, self._arrivals
+            self._new_sources, self._arrivals, self._waiting, self._notes = [], [], 0, []
+        return Delivery(watermark, sources, Arrivals.joined(arrivals), notes)
 
     def close(self) -> None:
         """Stop receiving, take in what the kernel still holds, let go of the ports; `drain` once more after this."""
@@ -148,31 +144,30 @@ class Receiver:
         heard = [(number, chunks) for number, link in enumerate(self._links) if (chunks := link.receive()).data]
         count = sum(len(chunks.data) for _, chunks in heard)
         self._rest_s = self._rest(count)
-        sources, arrivals, heads = self._intake.take(heard)
+        taken = [self._intake.take(heard)]
         if self._told:
-            told_by, told = self._intake.tell([self._told.popleft() for _ in range(len(self._told))])
-            sources, arrivals, heads = [*sources, *told_by], [*arrivals, *told], None
+            taken.append(self._intake.tell([self._told.popleft() for _ in range(len(self._told))]))
         notes = [note for link in self._links for note in link.news]
         for link in self._links:
             link.news.clear()
         with self._lock:
-            self._new_sources += sources
-            room = self._capacity - len(self._arrivals)
-            self._arrivals += arrivals[: max(room, 0)]
-            if arrivals and heads is None:
-                self._heads = None
-            elif heads is not None and self._heads is not None:
-                self._heads += heads[: max(room, 0)]
-            if len(arrivals) > room:
-                self._overflow += len(arrivals) - max(room, 0)
-                if not self._overflow_told:
-                    self._overflow_told = True
-                    notes.append(
-                        ("error", "This machine is too slow for what comes in: arrivals are being lost (counted).")
-                    )
+            for sources, arrivals in taken:
+                self._new_sources += sources
+                self._put(arrivals, notes)
             self._notes += notes
             self._watermark = self._stamper.watermark()
         return count
+
+    def _put(self, arrivals: Arrivals, notes: list[tuple[str, str]]) -> None:
+        """Into the queue, as far as there is room."""
+        kept = arrivals[: self._capacity - self._waiting]
+        if kept:
+            self._arrivals.append(kept)
+            self._waiting += len(kept)
+        self._overflow += len(arrivals) - len(kept)
+        if self._overflow and not self._overflow_told:
+            self._overflow_told = True
+            notes.append(("error", "This machine is too slow for what comes in: arrivals are being lost (counted)."))
 
     def _send_what_waits(self) -> None:
         while self._outbox:

@@ -5,16 +5,13 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from itertools import groupby
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from adapters import Arrival, Kind, Source
+from adapters.arrivals import Arrivals
 from adapters.pcap import PcapWriter
-from adapters.tlog import TlogWriter
+from adapters.tlog import TlogWriter, tlog_records
 from gateway.runtime.commands import CommandsWriter
 from gateway.runtime.folder import INPUTS, InputFile, Record, write_record
 from gateway.runtime.hold import Hold
@@ -26,36 +23,25 @@ _WRITERS: dict[Kind, type[TlogWriter] | type[PcapWriter] | type[CommandsWriter]]
     "radar": PcapWriter,
     "told": CommandsWriter,
 }
-_STAMP, _SOURCE = itemgetter(0), itemgetter(1)  # of an Arrival
 
 
 class _File:
-    """One file of arrivals of one kind. They gather in `pending` and are written at a flush."""
+    """One file of arrivals of one kind; they are written at a flush."""
 
     def __init__(self, path: Path, kind: Kind) -> None:
-        self.pending: list[Arrival] = []
         self.count = 0
-        self._kind = kind
         self._whole = WholeFile(path)
         self._writer = _WRITERS[kind](self._whole)
+        self.flush, self.close = self._whole.flush, self._whole.close
 
-    def flush(self) -> None:
-        arrivals, self.pending[:] = self.pending[:], []
-        self.count += len(arrivals)
-        if self._kind == "mavlink":  # 50 000 times a second: what TlogWriter does, of all of them at once
-            stamps = np.fromiter(map(_STAMP, arrivals), np.int64, len(arrivals)) // 1000
-            times = stamps.astype(">i8").view("V8").tolist()
-            self._whole.write_all([time + data for time, (_, _, data, _) in zip(times, arrivals, strict=True)])
-        else:
-            for arrival in arrivals:
-                self._writer.write(arrival.received_at, arrival.data, arrival.peer)
-        self._whole.flush()
+    def keep(self, arrival: Arrival) -> None:
+        self.count += 1
+        self._writer.write(arrival.received_at, arrival.data, arrival.peer)
 
-    def close(self) -> None:
-        try:
-            self.flush()
-        finally:
-            self._whole.close()
+    def keep_records(self, records: list[bytes]) -> None:
+        """What is a record of this file already."""
+        self.count += len(records)
+        self._whole.write_all(records)
 
 
 class _Input:
@@ -74,7 +60,7 @@ class _Input:
     def refuse(self, arrival: Arrival) -> None:
         if self._refused is None:
             self._refused = _File(self._folder / self._refused_name, self.described.kind)
-        self._refused.pending.append(arrival)
+        self._refused.keep(arrival)
 
     def flush(self) -> InputFile:
         self.kept.flush()
@@ -98,27 +84,31 @@ class Recorder:
         self.folder = folder
         self.record = record
         self._inputs: dict[int, _Input] = {}
-        self._pending: dict[int, list[Arrival]] = {}
         self._hold = Hold(folder)
         write_record(folder, record)
 
     def add(self, source: Source) -> None:
         """Make the file of a source that is new."""
-        made = self._inputs[source.number] = _Input(self.folder, source)
-        self._pending[source.number] = made.kept.pending
+        self._inputs[source.number] = _Input(self.folder, source)
 
     def keep(self, arrival: Arrival) -> None:
         """Record one arrival; it reaches the disk with the next flush."""
-        self._pending[arrival.source].append(arrival)
+        self._inputs[arrival.source].kept.keep(arrival)
 
     def keep_all(self, arrivals: Sequence[Arrival], refused: Collection[int] = ()) -> None:
         """Record many arrivals; those at the places `refused` apart."""
         for place in refused:
             self.refuse(arrivals[place])
-        apart = frozenset(refused)
-        kept = [one for place, one in enumerate(arrivals) if place not in apart] if apart else arrivals
-        for source, some in groupby(kept, _SOURCE):
-            self._pending[source] += some
+        apart, columns = frozenset(refused), Arrivals.of(arrivals)
+        records = tlog_records(columns.received_at, columns.data)
+        for source, places in columns.by_source():
+            recorded = self._inputs[source]
+            left = [place for place in places if place not in apart] if apart else places
+            if recorded.described.kind == "mavlink":
+                recorded.kept.keep_records([records[place] for place in left])
+            else:
+                for place in left:
+                    recorded.kept.keep(columns[place])
 
     def refuse(self, arrival: Arrival) -> None:
         """Record a datagram that was refused, apart: it is never replayed."""

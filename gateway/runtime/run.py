@@ -12,9 +12,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from adapters import Arrival, Source
+from adapters.arrivals import Arrivals
 from adapters.decode import Decoder
-from adapters.frame_batches import Head
 from adapters.signing import SigningGuard
 from gateway import __version__
 from gateway.observation import Heard
@@ -110,13 +112,12 @@ class Run:
         arrivals: Sequence[Arrival],
         watermark: int,
         notes: tuple[tuple[str, str], ...] = (),
-        heads: Sequence[Head] | None = None,
     ) -> Picture | None:
         """Take in arrivals and the watermark after them; the picture, or None while the place is not known.
 
-        `notes` are (level, text) of the links, to be told once. `heads`: of each arrival, where they are known.
+        `notes` are (level, text) of the links, to be told once.
         """
-        heard = self._hear(arrivals, heads)
+        heard = self._hear(Arrivals.of(arrivals))
         self._watermark = max(self._watermark, watermark)
         mark = self._decoder.watermark(self._watermark)
         heard.append(mark if not notes else replace(mark, notes=(*mark.notes, *notes)))
@@ -134,21 +135,23 @@ class Run:
             self._untold = ()
         return self._step(heard)
 
-    def _hear(self, arrivals: Sequence[Arrival], heads: Sequence[Head] | None) -> list[Heard]:
+    def _hear(self, arrivals: Arrivals) -> list[Heard]:
         """Record and decode; what holds something for the picture."""
-        if self._first_at is None and arrivals:
+        if self._first_at is None and len(arrivals):
             self._first_at = arrivals[0].received_at
         if (opening := self._opening) is not None:
-            begins = (place for place, one in enumerate(arrivals) if one.received_at >= opening.begins_at)
-            if (at := next(begins, None)) is not None:
-                return [*self._open(self._decode(arrivals[:at]), opening), *self._decode(arrivals[at:])]
-        return self._decode(arrivals, heads)
+            begins = np.flatnonzero(arrivals.received_at >= opening.begins_at).tolist()
+            if begins:
+                return [*self._open(self._decode(arrivals[: begins[0]]), opening), *self._decode(arrivals[begins[0] :])]
+        return self._decode(arrivals)
 
-    def _decode(self, arrivals: Sequence[Arrival], heads: Sequence[Head] | None = None) -> list[Heard]:
-        self._arrivals.update([source for _, source, _, _ in arrivals])
+    def _decode(self, arrivals: Arrivals) -> list[Heard]:
+        numbers = np.bincount(arrivals.source)
+        for source in np.flatnonzero(numbers).tolist():
+            self._arrivals[source] += int(numbers[source])
         if self.outputs is not None and self.outputs.publishes_on:
-            arrivals, heads = self._without_our_own(arrivals, self.outputs), None
-        said, refused = self._decoder.hear_many(arrivals, heads)
+            arrivals = self._without_our_own(arrivals, self.outputs)
+        said, refused = self._decoder.hear_many(arrivals)
         if self._recorder is not None:
             self._recorder.keep_all(arrivals, refused)
         if not self.setup.options.mutes:
@@ -156,7 +159,7 @@ class Run:
         left = (self._muting.without_muted(heard, arrivals[place].received_at) for place, heard in said)
         return [heard for heard in left if heard is not None]
 
-    def _without_our_own(self, arrivals: Sequence[Arrival], outputs: Outputs) -> list[Arrival]:
+    def _without_our_own(self, arrivals: Arrivals, outputs: Outputs) -> Arrivals:
         """What came in, but for what we published ourselves and somebody passed on."""
         others = []
         for arrival in arrivals:
@@ -164,7 +167,7 @@ class Run:
                 others.append(arrival)
             elif self._recorder is not None:
                 self._recorder.refuse(arrival)
-        return others
+        return arrivals if len(others) == len(arrivals) else Arrivals.of(others)
 
     def _before(self, heard: list[Heard], opening: Opening) -> list[Heard]:
         """Nothing has come yet from the session's beginning on: keep what will hold then, unless time has come to it."""

@@ -7,7 +7,12 @@ and a stamp that no other arrival has makes the order of a replay the order it w
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Instants = NDArray[np.int64]
 
 STAMP_STEP_NS = 4_000
 _BELIEVED_AGE_NS = 1_000_000_000  # a kernel time older than this is a clock that was set, not a datagram that waited
@@ -33,23 +38,25 @@ class Stamper:
         """The present time, ns since 1970 UTC, by the session's own clock."""
         return self._utc_of_monotonic_zero + self._monotonic_ns()
 
-    def heard(self, kernel_utc_ns: Sequence[int | None]) -> list[int]:
-        """When each was heard: what the kernel says, brought to the session's clock, else now.
+    def heard(self, kernel_utc_ns: Instants) -> Instants:
+        """When each was heard: what the kernel says, brought to the session's clock; else now, as where it says 0.
 
         Both clocks are read once for all: read for each, their jitter would turn datagrams around.
         """
         now, utc = self.now(), self._utc_ns()
-        oldest, ahead = utc - _BELIEVED_AGE_NS, now - utc
-        return [kernel + ahead if kernel and oldest < kernel <= utc else now for kernel in kernel_utc_ns]
+        believed = (kernel_utc_ns > max(utc - _BELIEVED_AGE_NS, 0)) & (kernel_utc_ns <= utc)
+        return np.where(believed, kernel_utc_ns + (now - utc), now)
 
-    def stamps(self, heard_at: Sequence[int]) -> list[int]:
+    def stamps(self, heard_at: Instants) -> Instants:
         """Stamps for what was heard then: each at or just before it, later than every stamp and watermark given before."""
-        last, given = self._last, []
-        for at in heard_at:
-            at -= at % STAMP_STEP_NS
-            last = at if at > last else last + STAMP_STEP_NS
-            given.append(last)
-        self._last = last
+        if not len(heard_at):
+            return heard_at
+        # Each is the later of its own time and one step after the one before: the running latest, counted without those steps.
+        steps = STAMP_STEP_NS * np.arange(len(heard_at))
+        earliest = heard_at - heard_at % STAMP_STEP_NS - steps
+        earliest[0] = max(int(earliest[0]), self._last + STAMP_STEP_NS)
+        given: Instants = np.maximum.accumulate(earliest) + steps
+        self._last = int(given[-1])
         return given
 
     def watermark(self) -> int:

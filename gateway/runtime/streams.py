@@ -78,7 +78,7 @@ class _StreamLink(ABC):
     def _is_open(self) -> bool: ...
 
     def _chunks(self, pieces: list[bytes]) -> Chunks:
-        return Chunks([str(self.url)] * len(pieces), pieces, [None] * len(pieces), self._stream)
+        return Chunks.of([str(self.url)] * len(pieces), pieces, [0] * len(pieces), self._stream)
 
     def send(self, data: bytes, peer: str | None) -> bool:
         """Send to the only peer there is. What cannot go out at once is dropped, but a frame never in its middle."""

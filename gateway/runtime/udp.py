@@ -12,6 +12,8 @@ import struct
 import sys
 from collections import Counter
 
+import numpy as np
+
 from gateway.runtime.batches import SO_RXQ_OVFL, SO_TIMESTAMPNS, Datagrams, batches_of
 from gateway.runtime.drain import Drain
 from gateway.runtime.links import RECEIVE_BUFFER_BYTES, Chunks, resolve
@@ -44,6 +46,8 @@ class UdpLink:
         self._hello_due_ns = 0
         self._heard = False
         self._senders: dict[str, tuple[str, int]] = {}
+        self._numbers: dict[str, int] = {}
+        self._numbered = 0
         family, self._address = resolve(url, socket.SOCK_DGRAM)
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._batches = batches_of(self._socket)
@@ -116,31 +120,29 @@ class UdpLink:
 
     def receive(self) -> Chunks:
         """The datagrams that wait, at most a turn's worth."""
-        chunks = Chunks([], [], [], None)
+        parts: list[Chunks] = []
+        left = _DATAGRAMS_A_TURN
         try:
-            while len(chunks.data) < _DATAGRAMS_A_TURN and self._take(chunks):
-                pass
+            while left > 0 and (batch := self._take()) is not None:
+                if batch.dropped is not None:
+                    self._lost(batch.dropped)
+                if batch.chunks.data:
+                    parts.append(batch.chunks)
+                left -= len(batch.chunks.data)
+                if not batch.is_full:
+                    break
         except (BlockingIOError, InterruptedError):
             pass
         except OSError as error:  # "nobody there" in answer to what we sent, or a network that went away
             self._failed(error)
-        self._heard = self._heard or bool(chunks.data)
-        return chunks
+        self._heard = self._heard or bool(parts)
+        return Chunks.joined(parts)
 
-    def _take(self, chunks: Chunks) -> bool:
-        """Add the next datagrams; whether there may be more. Raises OSError for what the socket has to report."""
+    def _take(self) -> Datagrams | None:
+        """The next datagrams; None where there are none. Raises OSError for what the socket has to report."""
         if self._batches is None:
-            self._take_one(chunks)
-            return True
-        batch = self._batches.receive() if self._drain is None else self._drained()
-        if batch is None:
-            return False
-        if batch.dropped is not None:
-            self._lost(batch.dropped)
-        chunks.peers.extend(batch.peers)
-        chunks.data.extend(batch.contents)
-        chunks.kernel_utc_ns.extend(batch.kernel_utc_ns)
-        return batch.is_full
+            return self._one()
+        return self._batches.receive() if self._drain is None else self._drained()
 
     def _drained(self) -> Datagrams | None:
         """What the other process has read for us; where it has ended, we read from now on."""
@@ -152,10 +154,11 @@ class UdpLink:
                 self._without_drain("has ended")
             self._drain.close()
             self._drain = None
-        return Datagrams([], [], [], None, is_full=True)
+        return Datagrams(Chunks.of((), [], ()), None, is_full=True)
 
-    def _take_one(self, chunks: Chunks) -> None:
-        kernel_utc_ns: int | None = None
+    def _one(self) -> Datagrams:
+        """One by one, on a system that has no other way."""
+        kernel_utc_ns, dropped = 0, None
         if not _LINUX:
             data, address = self._socket.recvfrom(_LARGEST_DATAGRAM)
         else:
@@ -165,10 +168,16 @@ class UdpLink:
                     seconds, nanoseconds = struct.unpack("@qq", content)
                     kernel_utc_ns = seconds * 1_000_000_000 + nanoseconds
                 elif (level, kind, len(content)) == (socket.SOL_SOCKET, SO_RXQ_OVFL, 4):
-                    self._lost(struct.unpack("@I", content)[0])
-        chunks.peers.append(_named(address) if address else str(self.url))
-        chunks.data.append(data)
-        chunks.kernel_utc_ns.append(kernel_utc_ns)
+                    dropped = int(struct.unpack("@I", content)[0])
+        name = _named(address) if address else str(self.url)
+        number = self._numbers.get(name)
+        if number is None:
+            if len(self._numbers) >= _PEERS_REMEMBERED:
+                self._numbers.clear()
+            self._numbered += 1
+            number = self._numbers[name] = self._numbered
+        chunk = Chunks([data], np.array([number]), {number: name}, np.array([kernel_utc_ns]))
+        return Datagrams(chunk, dropped, is_full=True)
 
     def _lost(self, dropped: int) -> None:
         """The kernel has dropped so many datagrams in all, modulo 2^32."""

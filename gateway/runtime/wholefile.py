@@ -18,41 +18,34 @@ class WholeFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o644)
-        self._pending = bytearray()
-        self._ends: list[int] = []  # of the pending records, counted from the start of the pending bytes
+        self._pending: list[bytes] = []  # records
         self._size = 0  # bytes in the file, all of them whole records
 
     def write(self, record: bytes) -> int:
         """Add one record; it reaches the disk with the next flush."""
-        self._pending += record
-        self._ends.append(len(self._pending))
+        self._pending.append(record)
         return len(record)
 
     def write_all(self, records: list[bytes]) -> None:
         """Add many records."""
-        size = len(self._pending)
-        self._pending += b"".join(records)
-        self._ends += accumulate(map(len, records), initial=size)
+        self._pending += records
 
     def flush(self) -> None:
         """Hand everything to the operating system.
 
         Raises OSError when it does not fit; then the file holds the records that did.
         """
-        written = 0
+        records, self._pending = self._pending, []
+        waiting, written = memoryview(b"".join(records)), 0
         try:
-            while written < len(self._pending):
-                written += os.write(self._descriptor, memoryview(self._pending)[written:])
+            while written < len(waiting):
+                written += os.write(self._descriptor, waiting[written:])
         except OSError:
-            whole = max((end for end in self._ends if end <= written), default=0)
+            whole = max((end for end in accumulate(map(len, records)) if end <= written), default=0)
             os.ftruncate(self._descriptor, self._size + whole)
-            self._forget(whole)
+            self._size += whole
             raise
-        self._forget(written)
-
-    def _forget(self, whole: int) -> None:
-        self._size += whole
-        self._pending, self._ends = bytearray(), []
+        self._size += written
 
     def close(self) -> None:
         """Flush and close."""

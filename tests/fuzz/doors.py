@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters import Arrival
+from adapters.arrivals import Arrivals
 from adapters.columns import iter_columns
 from adapters.decode import Decoder
 from adapters.kinds import FileError, kind_of
@@ -108,15 +109,15 @@ class Live:
         self.manners = Manners(heartbeat=True, request_rates=True, fetch_mission=True, key=key)
         self.state = pipeline.initial(corpus.SITE) if self.pictured else None
 
-    def take(self, now: int, link: int, peer: str, data: Sequence[bytes], lines: Sequence[bytes] = ()) -> list[Arrival]:
+    def take(self, now: int, link: int, peer: str, data: Sequence[bytes], lines: Sequence[bytes] = ()) -> Arrivals:
         """What a peer sends at once; what people tell. As arrivals, decoded, answered and worked in."""
         self.now = now
         stream = 0 if link == STREAM else None
-        chunks = Chunks([peer] * len(data), list(data), [None] * len(data), stream)
-        sources, arrivals, _ = self.intake.take([(link, chunks)])
+        chunks = Chunks.of([peer] * len(data), list(data), [0] * len(data), stream)
+        sources, arrivals = self.intake.take([(link, chunks)])
         if lines:
             more, told = self.intake.tell(lines)
-            sources, arrivals = sources + more, arrivals + told
+            sources, arrivals = sources + more, Arrivals.joined([arrivals, told])
         for source in sources:
             self.decoder.add(source)
             self.manners.add(source)

@@ -218,7 +218,7 @@ def test_whatever_links_bring_becomes_frames_with_rising_stamps(told: list[tuple
     manners = Manners(heartbeat=True, request_rates=True, fetch_mission=True)
     last = 0
     for link, data in told:
-        sources, arrivals, _ = intake.take([(link, Chunks(["10.0.0.1:5"], [data], [None], 0 if link == 2 else None))])
+        sources, arrivals = intake.take([(link, Chunks.of(["10.0.0.1:5"], [data], [0], 0 if link == 2 else None))])
         for source in sources:
             manners.add(source)
         for arrival in arrivals:

@@ -45,17 +45,14 @@ def until(happened: Callable[[], bool]) -> None:
 
 def everything(link: UdpLink, count: int) -> Chunks:
     """What has come, as soon as there is so much."""
-    heard = Chunks([], [], [], None)
+    heard: list[Chunks] = []
 
     def are_there() -> bool:
-        chunks = link.receive()
-        heard.peers.extend(chunks.peers)
-        heard.data.extend(chunks.data)
-        heard.kernel_utc_ns.extend(chunks.kernel_utc_ns)
-        return len(heard.data) >= count
+        heard.append(link.receive())
+        return sum(len(chunks.data) for chunks in heard) >= count
 
     until(are_there)
-    return heard
+    return Chunks.joined(heard)
 
 
 def is_running(process: int) -> bool:
@@ -87,7 +84,7 @@ def test_every_datagram_comes_whole_in_order_with_its_sender_and_its_time(link: 
         ports = [one.getsockname()[1] for one in (other, sender)]
     assert heard.data == [b"other", *sent]
     assert heard.peers == [f"127.0.0.1:{ports[0]}"] + [f"127.0.0.1:{ports[1]}"] * len(sent)
-    times = [at or 0 for at in heard.kernel_utc_ns]
+    times = heard.kernel_utc_ns.tolist()
     assert times == sorted(times)
     assert before <= times[0] <= times[-1] <= after
     assert not link.counters
