@@ -30,7 +30,7 @@ LABEL_NS = 1_000_000_000  # a label is text in every row: once a second is as of
 ELLIPSOID_SIGMAS = 3.0
 
 # A flat aircraft of four triangles: body, wings, tail plane, fin; one unit from nose to tail.
-_CORNERS = (
+OUTLINE = (
     ((0.6, 0.0, 0.0), (-0.4, 0.06, 0.0), (-0.4, -0.06, 0.0)),
     ((0.15, 0.0, 0.0), (-0.2, 0.5, 0.0), (-0.2, -0.5, 0.0)),
     ((-0.25, 0.0, 0.0), (-0.45, 0.2, 0.0), (-0.45, -0.2, 0.0)),
@@ -82,7 +82,7 @@ class TrackScene:
     def _looks(self, track: int) -> list[Entry]:
         """Sizes, names, and colours of lines: what is the same in every row."""
         path, units = entity("fuse", track), self._units
-        corners = np.array(_CORNERS).reshape(-1, 3)
+        corners = np.array(OUTLINE).reshape(-1, 3)
         symbol = rr.Mesh3D(
             vertex_positions=corners,
             triangle_indices=np.arange(12).reshape(4, 3),
