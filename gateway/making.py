@@ -9,7 +9,7 @@ from gateway import align, associate, fuse, predict, track
 from gateway.align import SECOND, Fix, Plot
 from gateway.associate import Change, Setting, Spans
 from gateway.frames import RadarFrame
-from gateway.fuse import Adopted, Ended, Lanes, LifeChange, Scene, Settled
+from gateway.fuse import Adopted, Ended, Joint, Lanes, LifeChange, Scene, Settled
 from gateway.fuse.filtering import Job
 from gateway.fuse.rows import Row
 from gateway.fuse.weighting import Model
@@ -46,7 +46,7 @@ class Making:
         self.forecasts: list[predict.Forecast] = []
         self.events: list[Event] = []
         self.jobs: dict[int, Job] = {}
-        self._both: tuple[Spans, tuple[Adopted, ...], Spans] = (Spans(), (), Spans())
+        self._both: tuple[Spans, tuple[Adopted, ...], tuple[Joint, ...], Spans] = (Spans(), (), (), Spans())
         self.untracked = 0
 
     def _work_in(self, lanes: Lanes, job: Job | None) -> None:
@@ -77,13 +77,13 @@ class Making:
 
     @property
     def _spans(self) -> Spans:
-        """Which radar track is which aircraft when: as associated, and where a new number goes on with an old one."""
-        found, adopted = self.association.ledger.spans, self.lanes.adopted
-        if not adopted:
+        """Which radar track is in which track when: as associated, as a number goes on, and as another radar's is."""
+        found, adopted, joints = self.association.ledger.spans, self.lanes.adopted, self.lanes.joints
+        if not adopted and not joints:
             return found
-        if found is not self._both[0] or adopted is not self._both[1]:
-            self._both = found, adopted, fuse.spans_with(found, adopted)
-        return self._both[2]
+        if found is not self._both[0] or adopted is not self._both[1] or joints is not self._both[2]:
+            self._both = found, adopted, joints, fuse.spans_with(found, adopted, joints)
+        return self._both[3]
 
     def _see_radars(self) -> None:
         self.radar_frames = {number: RadarFrame.of(radar, self.frame) for number, radar in self.radars.items()}

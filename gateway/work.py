@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 from gateway import associate, fuse, predict, track
@@ -46,6 +47,7 @@ class Work(Arriving):
     def _whole_second(self, at: int) -> None:
         """Ends, coasting, predictions, what scatters otherwise than stated, and forgetting what is older than the history."""
         self._settle()
+        self._join_radars(at)
         self.consistency, findings = self.consistency.judged(self.site.position, self.radars, at)
         for found in findings:
             self._say_scatter(found)
@@ -64,6 +66,7 @@ class Work(Arriving):
         was, self.lanes = self.lanes, lanes.pruned(before)
         self.settled += fuse.settled(was, self.lanes)
         self.tracks = self.tracks.pruned(before - int(PLOT_MARGIN_S * SECOND))
+        self.lanes = fuse.remembered(self.lanes, self.tracks, self._spans)
         gone = associate.missing(self.association, self.tracks)
         for key, aircraft in self.association.ledger.pairs.items():
             if key in gone:
@@ -154,7 +157,25 @@ class Work(Arriving):
             self.changes.append(change)
             verb = "is" if change.kind == "associated" else "is no longer"
             self.events.append(Event(change.at, "info", f"{change.aircraft} {verb} radar track {change.radar_track}"))
-        self.lanes, ended = fuse.joined(self.lanes, self._spans)
+        self.lanes, ended = fuse.joined(self.lanes, self._spans, self.tracks, self.now or 0)
+        self.ended += ended
+
+    def _join_radars(self, at: int) -> None:
+        """Radar tracks of several radars that are one target, brought into one system track; and others out of it."""
+        if len(self.radars) < 2:
+            return
+        seen, alive = associate.compared(self.association.together, at, self.tracks, self.radar_frames, {})
+        self.association = replace(self.association, together=seen)
+        known, found = self._spans, fuse.spans_with(self.association.ledger.spans, self.lanes.adopted)
+        done = fuse.regrouped(self.lanes, associate.together(alive, seen.one), found, known, self.tracks, at)
+        if done.lanes is self.lanes:
+            return
+        self.events += [Event(at, "info", text) for text in done.told]
+        self.lanes = done.lanes
+        self.lanes, jobs = fuse.reroute(self.lanes, known, self._scene())
+        self.jobs = {job.track: job for job in jobs}
+        self._settle()
+        self.lanes, ended = fuse.joined(self.lanes, self._spans, self.tracks, at)
         self.ended += ended
 
     # register -----------------------------------------------------------------------------------------------------
@@ -198,7 +219,7 @@ class Work(Arriving):
             return found
         self.lanes, job = fuse.taken_on(self.lanes, found, scene)
         jobs = [job] if job is not None else []
-        if found.lane.aircraft is not None:
+        if job is None:
             self.lanes, jobs = fuse.reroute(self.lanes, known, self._scene())
         self.jobs = {job.track: job for job in jobs}
         self._settle()

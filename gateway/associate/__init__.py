@@ -6,6 +6,9 @@ it is empty. A check waits until plots can bracket it and holds from the report'
 they touch and what followed from these, so that the result is that of in-order processing.
 
 `gates` compares one report with the radar tracks near it; `ledger` counts and pairs; `checks` keeps both in order of time.
+
+Radar tracks of several radars are compared with each other, too, whether a position source is there or not (paper 004, figure 1):
+`tracklets` says where each was a moment ago, `pairing` which pairs fit, `joining` counts.
 """
 
 from gateway.associate.checks import (
@@ -20,10 +23,12 @@ from gateway.associate.checks import (
     pruned,
     table,
 )
-from gateway.associate.gates import Comparison, Setting
+from gateway.associate.gates import SILENT_S, Comparison, Setting
+from gateway.associate.joining import Together, compared, together
 from gateway.associate.ledger import Change, Count, Ledger, Span, Spans, aircraft_of, ordinal_of
 
 __all__ = [
+    "SILENT_S",
     "Associated",
     "Association",
     "Change",
@@ -34,13 +39,16 @@ __all__ = [
     "Setting",
     "Span",
     "Spans",
+    "Together",
     "aircraft_of",
     "await_plots",
     "check_again",
     "check_due",
+    "compared",
     "forgotten",
     "missing",
     "ordinal_of",
     "pruned",
     "table",
+    "together",
 ]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix, Plot
 from gateway.associate.gates import SILENT_S, Comparison, Nearby, Setting, compare, compare_again
+from gateway.associate.joining import Together
 from gateway.associate.ledger import FAST_CHECKS_S, Change, Ledger, Spans, count
 from gateway.track import Key, RadarTracks, name_of
 
@@ -64,6 +65,7 @@ class Association:
     checks: tuple[Check, ...] = ()
     waiting: tuple[Fix, ...] = ()  # in order of validity
     chosen: Mapping[str, tuple[Fix, ...]] = field(default_factory=dict)  # each aircraft's reports of both, in order
+    together: Together = Together()  # radar tracks of several radars
 
     @property
     def due(self) -> Fix | None:
@@ -92,6 +94,7 @@ def await_plots(state: Association, fix: Fix) -> Association:
         state.checks,
         (*waiting[:place], fix, *waiting[place:]),
         {**state.chosen, fix.aircraft: tuple(others)},
+        state.together,
     )
 
 
@@ -122,7 +125,8 @@ def check_due(state: Association, until: int, tracks: RadarTracks, setting: Sett
         before, behind = checks[:place], []
         ledger = _fold(behind, checks[place].before if place < len(checks) else ledger, tail, state, setting)
         made += [check for check in behind if check.fix is fix]
-    return Association(ledger, (*before, *behind), state.waiting[done:], state.chosen), made
+    checks = (*before, *behind)
+    return Association(ledger, checks, state.waiting[done:], state.chosen, state.together), made
 
 
 def _among(checks: Sequence[Check], compared: Compared) -> tuple[int, list[Compared]]:
@@ -173,7 +177,8 @@ def pruned(state: Association, before: int) -> Association:
     ledger = _without_gone(replace(state.ledger, spans=kept if len(kept) < len(spans) else spans), before)
     since = before - int(FAST_CHECKS_S * SECOND)
     chosen = {aircraft: tuple(fix for fix in fixes if fix.at >= since) for aircraft, fixes in state.chosen.items()}
-    return Association(ledger, checks, state.waiting, {aircraft: fixes for aircraft, fixes in chosen.items() if fixes})
+    chosen = {aircraft: fixes for aircraft, fixes in chosen.items() if fixes}
+    return Association(ledger, checks, state.waiting, chosen, state.together)
 
 
 def _without_gone(ledger: Ledger, before: int) -> Ledger:

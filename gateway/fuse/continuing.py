@@ -19,7 +19,8 @@ from gateway.associate import Span, Spans, aircraft_of, ordinal_of
 from gateway.estimators.kalman import Estimate
 from gateway.fuse.agreement import CONFIRMED, expected
 from gateway.fuse.events import NEVER, Event, Job, rank
-from gateway.fuse.lanes import Adopted, Lane, Lanes
+from gateway.fuse.joints import closed, with_joints
+from gateway.fuse.lanes import Adopted, Joint, Lane, Lanes
 from gateway.fuse.placing import Scene, begin
 from gateway.fuse.weighting import Model
 from gateway.track import Key, RadarTracks, name_of
@@ -64,7 +65,7 @@ def continued(lanes: Lanes, key: Key, scene: Scene, model: Model) -> Continuatio
     plots = scene.tracks.plots.get(key, ())
     if not begin(plots) or aircraft_of(scene.spans, key, plots[-1].at) is not None:
         return None
-    fits = [(lane, former, _fit(lane, plots, model)) for lane, former in _silent(lanes, plots[0].at, scene)]
+    fits = [(lane, former, _fit(lane, plots, model)) for lane, former in _silent(lanes, key[0], plots[0].at, scene)]
     near = [(fit.log_likelihood, lane, former) for lane, former, fit in fits if fit is not None and fit.within]
     if not near:
         return None
@@ -77,19 +78,25 @@ def continued(lanes: Lanes, key: Key, scene: Scene, model: Model) -> Continuatio
     return Continuation(lane, key, plots[0].at, former)
 
 
-def _silent(lanes: Lanes, at: int, scene: Scene) -> Iterator[tuple[Lane, Key | None]]:
-    """Confirmed tracks that a radar saw lately, but none of their radar tracks since an instant; with the last of these."""
+def _silent(lanes: Lanes, radar: int, at: int, scene: Scene) -> Iterator[tuple[Lane, Key | None]]:
+    """Confirmed tracks that a radar saw lately, but none of its radar tracks since an instant; with the last of these.
+
+    Where other radars see it still, only one that this radar is known to have seen, too.
+    """
     longest = int(scene.options.end_after_s * SECOND)
     for lane in lanes.lanes.values():
         if not lane.events or lane.ended_at is not None or lane.last.score != CONFIRMED:
             continue
         if lane.last.radar_at == NEVER or at - lane.last.radar_at > longest:
             continue
-        mine = scene.spans.by_aircraft.get(lane.aircraft or "", ())
-        keys = [lane.key] if lane.key is not None else [span.key for span in mine if span.until is None]
-        last = {key: scene.tracks.plots[key][-1].at for key in keys if key in scene.tracks.plots}
-        if all(seen < at for seen in last.values()):
-            yield lane, max(last, key=lambda key: last[key]) if last else lane.key
+        keys = {span.key for span in scene.spans.by_aircraft.get(lane.name, ()) if span.until is None}
+        keys |= {lane.key} if lane.key is not None else set()
+        last = {key: scene.tracks.plots[key][-1].at for key in sorted(keys) if key in scene.tracks.plots}
+        if any(seen >= at for seen in last.values()):
+            last = {key: seen for key, seen in last.items() if key[0] == radar}
+            if not last or any(seen >= at for seen in last.values()):
+                continue
+        yield lane, max(last, key=lambda key: last[key]) if last else lane.key
 
 
 def _fit(lane: Lane, plots: Sequence[Plot], model: Model) -> _Fit | None:
@@ -129,8 +136,11 @@ def _has_rival(lane: Lane, key: Key, scene: Scene, model: Model) -> bool:
     return False
 
 
-def spans_with(spans: Spans, adopted: Sequence[Adopted]) -> Spans:
-    """Which radar track is which aircraft when: what association found, and what was adopted until it did."""
+def spans_with(spans: Spans, adopted: Sequence[Adopted], joints: Sequence[Joint] = ()) -> Spans:
+    """Which radar track is which aircraft when, or in which other track.
+
+    What association found; what was adopted until it did; and what is there because another radar's track is.
+    """
     mine = {one.key: one for one in adopted}
     since = {one.former: one.since for one in adopted if one.former is not None}
     found = []
@@ -143,7 +153,8 @@ def spans_with(spans: Spans, adopted: Sequence[Adopted]) -> Spans:
     for one in adopted:
         ends = [at for at in (one.until, *(span.since for span in spans.by_key.get(one.key, ()))) if at is not None]
         found.append(Span(one.key, one.aircraft, one.since, min(ends, default=None)))
-    return Spans(sorted((s for s in found if s.until is None or s.until > s.since), key=lambda span: span.since))
+    known = Spans(sorted((s for s in found if s.until is None or s.until > s.since), key=lambda span: span.since))
+    return with_joints(known, joints) if joints else known
 
 
 def reviewed(lanes: Lanes, spans: Spans, tracks: RadarTracks, at: int) -> tuple[Lanes, list[Adopted]]:
@@ -187,12 +198,15 @@ def adopted_earlier(lanes: Lanes, key: Key, at: int) -> Lanes | None:
 def taken_on(lanes: Lanes, found: Continuation, scene: Scene) -> tuple[Lanes, Job | None]:
     """The lanes with a radar track going on as another one's: an aircraft's is adopted; what else is there goes on as it is.
 
-    The job is that of the new plots, where it is no aircraft; an aircraft's track is to be worked again from `since` on.
+    The job is that of the new plots, where they are its only ones; else the track is to be worked again from `since` on.
     """
     lane = found.lane
     if lane.aircraft is not None:
         one = Adopted(found.key, lane.aircraft, found.since, found.former, gps_at=max(found.since, lane.last.gps_at))
         return replace(lanes, adopted=(*lanes.adopted, one)), None
+    if found.former is not None and found.former != lane.key:  # another radar's track that is in it
+        begun = Joint(found.key, lane.name, found.since)
+        return replace(lanes, joints=(*closed(lanes.joints, found.former, found.since), begun)), None
     # Its past cannot be made again from the new radar track's plots, so none of it may be given up.
     lane = replace(lane, key=found.key, ordinal=ordinal_of(scene.spans, found.key, found.since), whole=False)
     plots = sorted(scene.tracks.plots[found.key], key=rank)

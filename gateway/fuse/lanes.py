@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from gateway.align import SECOND, Plot
-from gateway.associate import Spans
+from gateway.associate import SILENT_S, Span, Spans
 from gateway.fuse.filtering import Event
 from gateway.settings import Options
-from gateway.track import Key, name_of
+from gateway.track import Key, RadarTracks, name_of
 
+_TRACK = "track "  # no aircraft's name has a space
 EVENTS_AT_MOST = 1024  # of one track: a source of more than 100 measurements a second has a shorter history
 
 
@@ -29,6 +30,11 @@ class Lane:
     emptied_at: int = 0  # when its past was forgotten
     origin: str = ""  # how it began, for people
     told: str = ""  # the part of its life that was last told
+
+    @property
+    def name(self) -> str:
+        """What its radar tracks are said to be: its aircraft, else the track itself."""
+        return self.aircraft or f"{_TRACK}{self.track}"
 
     @property
     def last(self) -> Event:
@@ -94,6 +100,16 @@ class Adopted:
 
 
 @dataclass(frozen=True, slots=True)
+class Joint:
+    """A radar track that is in another radar's track since an instant, or in an aircraft's because another radar's is."""
+
+    key: Key
+    name: str  # the track's, see `Lane.name`
+    since: int
+    until: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Lanes:
     """All system tracks; track numbers count from 1, and none is ever given to something else."""
 
@@ -103,6 +119,14 @@ class Lanes:
     next_track: int = 1
     gone: Mapping[str, Gone] = field(default_factory=dict)  # of aircraft whose track ended, the latest last
     adopted: tuple[Adopted, ...] = ()
+    joints: tuple[Joint, ...] = ()  # in the order in which they began
+
+    def track_of(self, name: str) -> int | None:
+        """The track with a name, see `Lane.name`; None where there is none."""
+        if not name.startswith(_TRACK):
+            return self.by_aircraft.get(name)
+        track = int(name.removeprefix(_TRACK))
+        return track if track in self.lanes else None
 
     def with_lane(self, lane: Lane) -> Lanes:
         """The same with one lane put in place of its former self."""
@@ -110,7 +134,8 @@ class Lanes:
 
     def with_lanes(self, lanes: Mapping[int, Lane]) -> Lanes:
         """The same with some lanes put in place of their former selves."""
-        return Lanes({**self.lanes, **lanes}, self.by_aircraft, self.by_key, self.next_track, self.gone, self.adopted)
+        known = {**self.lanes, **lanes}
+        return Lanes(known, self.by_aircraft, self.by_key, self.next_track, self.gone, self.adopted, self.joints)
 
     def begun(self, aircraft: str | None, key: Key | None, ordinal: int, origin: str) -> tuple[Lanes, Lane]:
         """The same with a new lane of the next number."""
@@ -126,7 +151,7 @@ class Lanes:
         if lane.key is not None:
             by_key = {**by_key, (lane.key, lane.ordinal): lane.track}
         lanes = {**self.lanes, lane.track: lane}
-        return Lanes(lanes, by_aircraft, by_key, self.next_track, gone, self.adopted)
+        return Lanes(lanes, by_aircraft, by_key, self.next_track, gone, self.adopted, self.joints)
 
     def without(self, tracks: Iterable[int]) -> Lanes:
         """The same without some tracks."""
@@ -160,15 +185,20 @@ def contains(lanes: Lanes, track: int | None, plot: Plot) -> bool:
     return False
 
 
-def joined(lanes: Lanes, spans: Spans) -> tuple[Lanes, list[Ended]]:
-    """The lanes with those radar tracks ended that became an aircraft, and those going on that in hindsight did not."""
+def joined(lanes: Lanes, spans: Spans, tracks: RadarTracks, at: int) -> tuple[Lanes, list[Ended]]:
+    """The lanes with those of radar tracks ended that became another one, and those going on that in hindsight did not."""
     ended = []
+    hosted: dict[str, list[Joint]] = {}
+    for joint in lanes.joints:
+        hosted.setdefault(joint.name, []).append(joint)
     for lane in list(lanes.lanes.values()):
         if lane.key is None:
             continue
-        to = joined_at(lane, spans)
+        to = joined_at(lane, spans, hosted.get(lane.name, ()), tracks, at)
         if to is not None and lane.ended_at is None:
-            ended.append(Ended(to[0], lane.track, f"joined track {lanes.by_aircraft.get(to[1], 0)}, {to[1]}"))
+            track, who = lanes.track_of(to[1]) or 0, lanes.by_aircraft.get(to[1])
+            same = "the same target" if who is None else to[1]
+            ended.append(Ended(to[0], lane.track, f"joined track {track}, {same}"))
         if (to[0] if to else None) != lane.ended_at:
             lanes = lanes.with_lane(replace(lane, ended_at=to[0] if to else None))
     return lanes, ended
@@ -186,24 +216,49 @@ def emptied(lanes: Lanes, at: int) -> tuple[Lanes, list[Ended]]:
         for track, lane in lanes.lanes.items()
         if lane.key is not None and lane.ended_at is None
     ]
-    return replace(lanes, lanes=kept, by_key={}, gone={}, adopted=()), ended
+    return replace(lanes, lanes=kept, by_key={}, gone={}, adopted=(), joints=()), ended
 
 
-def joined_at(lane: Lane, spans: Spans) -> tuple[int, str] | None:
-    """When and to which aircraft a radar track's lane went over, or None while it stands alone."""
+def joined_at(
+    lane: Lane, spans: Spans, joints: Sequence[Joint], tracks: RadarTracks, at: int
+) -> tuple[int, str] | None:
+    """When and to which track a radar track's lane went over, with all its radar tracks; None while it stands alone.
+
+    `joints`: of the other radars' tracks that are in it.
+    """
     if lane.key is None:
         return None
-    following = [s for s in spans.by_key.get(lane.key, ()) if s.index == lane.ordinal + 1]
-    return (following[0].since, following[0].aircraft) if following else None
+    following = _following(spans, lane.key, lane.ordinal)
+    if not joints:
+        return None if following is None else (following.since, following.aircraft)
+    left = [] if following is None else [following]
+    stays = following is None and is_alive(tracks, lane.key, at)
+    for joint in joints:
+        mine = next((s for s in reversed(spans.by_key.get(joint.key, ())) if s.aircraft == lane.name), None)
+        after = None if mine is None else _following(spans, joint.key, mine.index)
+        if after is not None and mine is not None and after.since == mine.until:
+            left.append(after)
+        stays |= mine is not None and mine.until is None and is_alive(tracks, joint.key, at)
+    if stays or not left:
+        return None
+    last = max(left, key=lambda span: span.since)
+    return (last.since, last.aircraft) if not lane.events or lane.last.at < last.since else None
+
+
+def _following(spans: Spans, key: Key, index: int) -> Span | None:
+    return next((span for span in spans.by_key.get(key, ()) if span.index == index + 1), None)
+
+
+def is_alive(tracks: RadarTracks, key: Key, at: int) -> bool:
+    """Whether a radar track had a plot lately."""
+    plots = tracks.plots.get(key, ())
+    return bool(plots) and at - plots[-1].at <= int(SILENT_S * SECOND)
 
 
 def radar_names(lane: Lane, spans: Spans, at: int) -> str | None:
-    """The radar tracks behind a lane at an instant, as people write them."""
+    """The radar tracks behind a lane at an instant, as people write them, with a space between."""
+    known = spans.by_aircraft.get(lane.name, ())
+    names = {name_of(s.key) for s in known if s.since <= at and (s.until is None or at < s.until)}
     if lane.key is not None:
-        return name_of(lane.key)
-    names = [
-        name_of(s.key)
-        for s in spans.by_aircraft.get(lane.aircraft or "", ())
-        if s.since <= at and (s.until is None or at < s.until)
-    ]
-    return " ".join(sorted(set(names))) or None
+        names.add(name_of(lane.key))
+    return " ".join(sorted(names)) or None

@@ -62,9 +62,9 @@ def take_fix(lanes: Lanes, fix: Fix, scene: Scene) -> tuple[Lanes, Job | None]:
 
 def take_plot(lanes: Lanes, plot: Plot, key: Key, scene: Scene) -> tuple[Lanes, Job | None]:
     """The lanes with a plot in the track that it belongs to; no job means too late, or that nothing can start yet."""
-    aircraft = aircraft_of(scene.spans, key, plot.at)
-    if aircraft is not None:
-        track = lanes.by_aircraft.get(aircraft)
+    name = aircraft_of(scene.spans, key, plot.at)
+    if name is not None:
+        track = lanes.track_of(name)
         return _inserted(lanes, lanes.lanes[track], plot, scene) if track is not None else (lanes, None)
     ordinal = ordinal_of(scene.spans, key, plot.at)
     track = lanes.by_key.get((key, ordinal))
@@ -78,9 +78,9 @@ def take_plot(lanes: Lanes, plot: Plot, key: Key, scene: Scene) -> tuple[Lanes, 
 
 def lane_of(lanes: Lanes, plot: Plot, key: Key, scene: Scene) -> int | None:
     """The track that a plot belongs to, or None where none has begun."""
-    aircraft = aircraft_of(scene.spans, key, plot.at)
-    if aircraft is not None:
-        return lanes.by_aircraft.get(aircraft)
+    name = aircraft_of(scene.spans, key, plot.at)
+    if name is not None:
+        return lanes.track_of(name)
     return lanes.by_key.get((key, ordinal_of(scene.spans, key, plot.at)))
 
 
@@ -96,12 +96,12 @@ def reroute(lanes: Lanes, old: Spans, scene: Scene) -> tuple[Lanes, list[Job]]:
             if before == now:
                 continue
             keys.setdefault(key, at)
-            for aircraft in (before, now):
-                if aircraft is not None:
-                    from_when[aircraft] = min(at, from_when.get(aircraft, at))
+            for name in (before, now):
+                if name is not None:
+                    from_when[name] = min(at, from_when.get(name, at))
     jobs = []
-    for aircraft, at in sorted(from_when.items()):
-        track = lanes.by_aircraft.get(aircraft)
+    for name, at in sorted(from_when.items()):
+        track = lanes.track_of(name)
         if track is not None:
             lanes, job = _rebuilt(lanes, lanes.lanes[track], at, scene)
             jobs.append(job)
@@ -152,7 +152,7 @@ def _rebuilt(lanes: Lanes, lane: Lane, at: int, scene: Scene) -> tuple[Lanes, Jo
     else:
         if lane.whole:
             keep = 0
-        plots = _free_plots(lane, scene)
+        plots = sorted([*_free_plots(lane, scene), *_plots_of(lane.name, scene)], key=rank)
         measures = [*begin(plots)] if not keep else [p for p in plots if p.at >= at]
     lane = lane.with_events(lane.events[:keep])
     lanes = lanes.with_lane(lane)
@@ -172,10 +172,10 @@ def _begun_from_plots(lanes: Lanes, key: Key, ordinal: int, scene: Scene) -> tup
     return lanes, Job(lane.track, None, measures, scene.neighbour(lane))
 
 
-def _plots_of(aircraft: str, scene: Scene) -> list[Plot]:
-    """All remembered plots of the radar tracks that are this aircraft, at the times when they are."""
+def _plots_of(name: str, scene: Scene) -> list[Plot]:
+    """All remembered plots of the radar tracks that are an aircraft, or in another radar's track, at the times when they are."""
     found = []
-    for span in scene.spans.by_aircraft.get(aircraft, ()):
+    for span in scene.spans.by_aircraft.get(name, ()):
         plots = scene.tracks.plots.get(span.key, ())
         found += [plot for plot in plots if plot.at >= span.since and (span.until is None or plot.at < span.until)]
     return found
@@ -202,7 +202,8 @@ def begin(plots: Sequence[Plot]) -> list[Measure]:
             if not math.isnan(polar[component]):
                 continue
             for other in reversed(plots[:place]):
-                if not math.isnan(other.polar[component]) and plot.at - other.at <= COMPLETED_WITHIN_S * SECOND:
+                is_near = other.radar == plot.radar and plot.at - other.at <= COMPLETED_WITHIN_S * SECOND
+                if is_near and not math.isnan(other.polar[component]):
                     polar[component] = other.polar[component]
                     moved_m = 150.0 * (plot.at - other.at) / SECOND
                     sigma[component] += moved_m if component == 0 else moved_m / max(polar[0], 300.0)

@@ -1,0 +1,138 @@
+"""Tracklets: where each radar track was a moment ago and how fast it flew, from its own plots of the last seconds.
+
+They are what two radars are compared by: nothing of a position source and nothing of another radar is in them. Each of
+range, azimuth and elevation is a parabola through the plots that have it, so that it does not matter which plots lack what.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.align import SECOND, Plot
+from gateway.frames import RadarFrame, turn, xyz_from_polar
+from gateway.track import Key, RadarTracks
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+WINDOW_S = 6.0  # short enough that an aircraft's turn is a parabola
+SLOW_WINDOW_S = 13.0  # for a radar that turns slowly: nearly all that is remembered of a track
+LEAST_PLOTS, LEAST_SPAN_S = 3, 2.5  # with range and azimuth
+SILENT_S = 2.0  # without a plot for longer, and for longer than three of its own rhythm, a track is not compared
+ACCELERATION_MPS2 = 10.0  # of a parabola, 1 sigma: what an aircraft does, and what polar coordinates add near the radar
+UNKNOWN_ELEVATION_RAD = (0.1, 0.1)  # where it is never measured: what aircraft have, and 1 sigma
+UNKNOWN_RATE_RADPS = 0.03
+_STEP = (1.0, 1e-5, 1e-5, 0.1, 1e-6, 1e-6)  # for derivatives
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracklets:
+    """n radar tracks at one instant: position and velocity in the runway's ENU, and what noise and radar's errors do to them."""
+
+    keys: tuple[Key, ...]
+    radar: Ints  # (n,)
+    state: Floats  # (n, 6) m, m/s
+    covariance: Floats  # (n, 6, 6) of the noise
+    by_error: Floats  # (n, 6, 3) derivatives by the radar's range, azimuth and elevation
+
+
+def tracklets(tracks: RadarTracks, at: int, radars: Mapping[int, RadarFrame]) -> Tracklets:
+    """The radar tracks that have enough plots up to an instant, as they were `WINDOW_S` / 2 before it."""
+    chosen: list[tuple[Key, list[Plot]]] = []
+    for key, plots in tracks.plots.items():
+        if key[0] in radars and (recent := _recent(plots, at)):
+            chosen.append((key, recent))
+    middle = at - int(0.5 * WINDOW_S * SECOND)
+    value, rate, spread = _parabolas([plots for _, plots in chosen], middle)
+    radar = np.array([key[0] for key, _ in chosen], np.int64)
+    state, by_polar = _placed(np.concatenate([value, rate], axis=1), radar, radars)
+    covariance = by_polar @ spread @ by_polar.transpose(0, 2, 1)
+    return Tracklets(
+        tuple(key for key, _ in chosen), radar, state, covariance, np.ascontiguousarray(by_polar[:, :, :3])
+    )
+
+
+def _recent(plots: tuple[Plot, ...], at: int) -> list[Plot]:
+    """A track's plots of the last seconds; none where they are too few, too old, or say too little."""
+    first, slow = at - int(WINDOW_S * SECOND), at - int(SLOW_WINDOW_S * SECOND)
+    recent: list[Plot] = []
+    for plot in reversed(plots):
+        if plot.at > at:
+            continue
+        if plot.at < slow or (plot.at < first and len(recent) > LEAST_PLOTS):
+            break
+        recent.append(plot)
+    if len(recent) < LEAST_PLOTS:
+        return []
+    span_s = (recent[0].at - recent[-1].at) / SECOND
+    rhythm_s = span_s / (len(recent) - 1)
+    if span_s < LEAST_SPAN_S or (at - recent[0].at) / SECOND > max(SILENT_S, 3.0 * rhythm_s):
+        return []
+    known = [sum(not math.isnan(plot.polar[component]) for plot in recent) for component in (0, 1)]
+    return recent if min(known) >= LEAST_PLOTS else []
+
+
+def _parabolas(tracks: list[list[Plot]], middle: int) -> tuple[Floats, Floats, Floats]:
+    """Range, azimuth, elevation of k tracks at an instant (k, 3), their rates (k, 3), and the covariance of both (k, 6, 6)."""
+    count, longest = len(tracks), max((len(plots) for plots in tracks), default=1)
+    polar, sigma = np.full((count, longest, 3), math.nan), np.ones((count, longest, 3))
+    time_s = np.zeros((count, longest))
+    for row, plots in enumerate(tracks):
+        n = len(plots)
+        polar[row, :n] = [plot.polar for plot in plots]
+        sigma[row, :n] = [plot.sigma for plot in plots]
+        time_s[row, :n] = [(plot.at - middle) / SECOND for plot in plots]
+    known = ~np.isnan(polar)
+    first = np.take_along_axis(polar, known.argmax(axis=1)[:, None, :], axis=1)  # (k, 1, 3) the newest that is known
+    first = np.where(np.isnan(first), UNKNOWN_ELEVATION_RAD[0], first)
+    off = np.where(known, polar - first, 0.0)
+    off[:, :, 1] = np.remainder(off[:, :, 1] + math.pi, 2.0 * math.pi) - math.pi
+    weight = np.where(known, 1.0 / sigma**2, 0.0)
+    basis = np.stack([np.ones_like(time_s), time_s, 0.5 * time_s**2], axis=-1)  # (k, m, 3)
+    weighted = weight[:, :, :, None] * basis[:, :, None, :]  # (k, m, component, power)
+    information = (weighted[..., :, None] * basis[:, :, None, None, :]).sum(axis=1)  # (k, component, 3, 3)
+    vector = (weighted * off[..., None]).sum(axis=1)
+    distance = np.maximum(first[:, 0, 0], 300.0)
+    bend = np.stack([np.ones_like(distance), distance, distance], axis=-1) / ACCELERATION_MPS2
+    information[:, :, 2, 2] += bend**2
+    flat = ~known[:, :, 2].any(axis=1)
+    information[:, 2, 0, 0] += flat / UNKNOWN_ELEVATION_RAD[1] ** 2
+    information[:, 2, 1, 1] += 1.0 / UNKNOWN_RATE_RADPS**2
+    spread = np.linalg.inv(information)
+    found = (spread @ vector[..., None])[..., 0]
+    covariance = np.zeros((count, 6, 6))
+    for component in range(3):
+        places = np.ix_(range(count), (component, component + 3), (component, component + 3))
+        covariance[places] = spread[:, component, :2, :2]
+    return first[:, 0] + found[:, :, 0], found[:, :, 1], covariance
+
+
+def _placed(polar: Floats, radar: Ints, radars: Mapping[int, RadarFrame]) -> tuple[Floats, Floats]:
+    """Position and velocity in ENU (n, 6) of polar values and rates (n, 6), and the derivatives (n, 6, 6) of these by those."""
+    state, by_polar = np.zeros((len(polar), 6)), np.zeros((len(polar), 6, 6))
+    for number in np.unique(radar).tolist():
+        rows, frame = radar == number, radars[number]
+        state[rows] = _moving(polar[rows], frame)
+        for place, step in enumerate(_STEP):
+            aside = np.zeros(6)
+            aside[place] = step
+            ahead, behind = _moving(polar[rows] + aside, frame), _moving(polar[rows] - aside, frame)
+            by_polar[rows, :, place] = (ahead - behind) / (2.0 * step)
+    return state, by_polar
+
+
+def _moving(polar: Floats, frame: RadarFrame) -> Floats:
+    """ENU position and velocity (n, 6) of range, azimuth, elevation and their rates (n, 6)."""
+    r, azimuth, elevation, closing, turning, rising = polar.T
+    level, climb = r * np.cos(elevation), np.sin(elevation)
+    out = closing * np.cos(elevation) - rising * r * climb
+    x = out * np.cos(azimuth) - turning * level * np.sin(azimuth)
+    y = out * np.sin(azimuth) + turning * level * np.cos(azimuth)
+    velocity = np.stack([x, y, closing * climb + rising * level], axis=-1)
+    place = frame.to_enu(xyz_from_polar(np.ascontiguousarray(polar[:, :3])))
+    return np.concatenate([place, turn(frame.enu_from_radar, velocity)], axis=1)
