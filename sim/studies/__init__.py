@@ -10,9 +10,11 @@ STUDIES = (
     "smoothing",
     "alpha-beta-gamma",
     "rmimm",
+    "prediction",
     "consistency",
     "tuning",
     "registration",
+    "clutter",
 )  # the modules of this package that have a `run`, `-` for `_`
 
 Progress = Callable[[str, float], None]  # what is being done, and the share of the whole that is done

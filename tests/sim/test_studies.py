@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sim.studies import STUDIES
+from sim.studies import STUDIES, prediction
 from sim.studies import alpha_beta_gamma_peers as peers
 from sim.studies import alpha_beta_gamma_tables as tables
 from sim.studies.alpha_beta_gamma import run
@@ -32,4 +32,15 @@ def test_the_alpha_beta_gamma_study_fills_its_tables_and_draws(tmp_path: Path, m
         assert {len(row) for row in table.rows} == {len(table.columns)}
     assert found.figures["manoeuvre q 0.001 adaptive"] < found.figures["manoeuvre q 0.001 fixed"]
     assert told == sorted(told)
+    assert (tmp_path / "figures.rrd").read_bytes()[:4] == b"RRF2"
+
+
+def test_the_prediction_study_fills_its_tables_and_draws(tmp_path: Path) -> None:
+    """Two runs give every table rows as wide as its headings, literal and default among them, and a recording."""
+    found = prediction.run(2, 1, rrd=tmp_path / "figures.rrd")
+    assert len(found.tables) == 5
+    for table in found.tables:
+        assert table.rows
+        assert {len(row) for row in table.rows} == {len(table.columns)}
+    assert {row[0] for row in found.tables[0].rows} == {"literal", "default"}
     assert (tmp_path / "figures.rrd").read_bytes()[:4] == b"RRF2"
