@@ -1,0 +1,42 @@
+"""Which track has which plot, when several may have several: marginal probabilities by belief propagation.
+
+A track has one plot at most, a plot one track at most. Messages run along the pairs of track and plot that are possible at all,
+so cost follows these, and tracks without a common plot do not touch each other. Where no plot lies with two tracks the first
+round is exact; else the sum over all joint associations is approached as by Williams and Lau (2014).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ROUNDS_AT_MOST = 30
+SETTLED = 1e-3  # of a message
+
+
+def shared(track: Ints, plot: Ints, weight: Floats, none: Floats, plots: int) -> tuple[Floats, Floats, Floats]:
+    """Chances (e,) of the pairs, (t,) of tracks to have no plot, (m,) of plots to have no track.
+
+    weight (e,) of track[e] having plot[e], none (t,) of a track having none, both in the same units: how likely they are
+    against the plot being clutter. A track has at most one pair with a plot.
+    """
+    tracks = len(none)
+    free = np.ones(len(track))
+    often = np.bincount(plot, minlength=plots)
+    contested = often.max(initial=0) > 1
+    for _ in range(ROUNDS_AT_MOST if contested else 1):
+        open_ = weight * free
+        total = none + np.bincount(track, open_, minlength=tracks)
+        claim = weight / (total[track] - open_)
+        claimed = 1.0 + np.bincount(plot, claim, minlength=plots)
+        after = 1.0 / (claimed[plot] - claim)
+        done = not contested or np.abs(after - free).max(initial=0.0) < SETTLED
+        free = after
+        if done:
+            break
+    open_ = weight * free
+    total = none + np.bincount(track, open_, minlength=tracks)
+    return open_ / total[track], none / total, np.asarray(1.0 / claimed)
