@@ -44,6 +44,7 @@ class Inference:
     regulation_sigma_s: float = 900.0  # of the time to go to a published or ordered point; eq 20
     plan_sigma_s: float = 170.0  # and to a planned one
     mean_turn: float = math.radians(60.0)  # what is left of a turn, on average, whatever was turned already
+    kept: float = 10.0  # how much more a point counts in a turn that it was flown at just before: most such turns are none
 
     @classmethod
     def of(cls, rule: Rule) -> Inference:
@@ -64,6 +65,7 @@ class Seen:
     length: Floats  # (n,) faded count of them; 0 = nothing yet
     last: Floats  # (n, c) the last agreement; NaN = none yet
     turning: Ints  # (n,) the last mode: 0 straight, 1 left, -1 right
+    flown_at: Floats  # (n, c) the weight on the last straight, faded since it ended
 
     @classmethod
     def nothing(cls, aircraft: int, candidates: int) -> Seen:
@@ -73,6 +75,7 @@ class Seen:
             np.zeros(aircraft),
             np.full((aircraft, candidates), math.nan),
             np.zeros(aircraft, dtype=np.int64),
+            np.zeros((aircraft, candidates)),
         )
 
 
@@ -132,12 +135,14 @@ def seen(before: Seen, off: Floats, turning: Ints, elapsed_s: Floats, inference:
     kept = np.where(fresh, 0.0, inference.fade**elapsed_s)
     agreed = np.nan_to_num(before.agreed) * kept[:, None] + agreement
     length = before.length * kept + 1.0
-    after = Seen(agreed, length, agreement, turning)
     straight = agreed / length[:, None]
+    flown_at = np.where((turning == 0)[:, None], straight, before.flown_at * (inference.fade**elapsed_s)[:, None])
+    after = Seen(agreed, length, agreement, turning, flown_at)
     if inference.rule == "literal":
         manoeuvring = agreement - np.where(np.isnan(before.last), agreement, before.last)
     else:
-        manoeuvring = np.exp(-to_turn(off, turning) / inference.mean_turn)
+        usual = np.exp(-to_turn(off, turning) / inference.mean_turn)
+        manoeuvring = usual * (1.0 + inference.kept * np.nan_to_num(flown_at))
     return after, np.where((turning == 0)[:, None], straight, manoeuvring)
 
 
