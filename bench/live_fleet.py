@@ -2,8 +2,8 @@
 
 python -m bench.live_fleet KIND AIRCRAFT SECONDS       prints, as JSON, what one run gave; KIND as in `bench.sky`
 
-The whole gateway runs in a process of its own, with its archive and a server for viewers, the sky in another. The time of
-an observation ends when its picture is with every sink.
+The whole gateway runs with its archive and a server for viewers, the sky in another process. The time of an observation
+ends when its picture is with every sink. The CPU time of the process that draws counts as the gateway's.
 """
 
 from __future__ import annotations
@@ -49,6 +49,7 @@ class Stopwatch:
 
     def __init__(self) -> None:
         self.meter = Meter(None)
+        self.drawn_by: int | None = None
         self.told_ms: list[float] = []
         self._first_ns: int | None = None
 
@@ -57,6 +58,9 @@ class Stopwatch:
         from gateway.observation import GpsReport, RadarPlot
 
         now = time.time_ns()
+        if self.drawn_by is None and run.outputs is not None:
+            self.drawn_by = run.outputs.drawn_by
+            self.meter = Meter(self.drawn_by)
         self.meter(run, picture)
         if picture is None:
             return

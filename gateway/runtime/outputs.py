@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +19,18 @@ from gateway.runtime.summary import SmoothedSummary
 from gateway.runtime.urls import LinkError
 from gateway.settings import Site
 from gateway.sinks import Sink
+from gateway.sinks.apart import Apart
 from gateway.sinks.arrow import ArrowSink
 from gateway.sinks.aside import Aside
 from gateway.sinks.parquet import SmoothedTable, finish
 from gateway.sinks.publish import PublishSink
-from gateway.sinks.rerun import RerunSink
+
+if TYPE_CHECKING:
+    from gateway.sinks.rerun import RerunSink
 
 RRD_FILE = "session.rrd"
 _WATCHED = (0.4, 256)  # seconds and rows that are drawn at once, for people who look on
-_LIVE = (0.4, 16384)  # the same where drawing has a thread of its own and holds up nothing
+_LIVE = (0.4, 16384)  # the same where drawing has a process of its own and holds up nothing
 _TABLES_WATCHED_S = 1.0  # of rows that a kill may cost
 _UNWATCHED = (30.0, 4096)  # where a recording is replayed as fast as it goes: fewer, larger batches cost less
 
@@ -42,7 +46,7 @@ class Outputs:
     def __init__(self, site: Site, folder: Path | None, setup: Setup) -> None:
         self._folder = folder
         self._sinks: list[Sink] = []
-        self._rerun: RerunSink | None = None
+        self._rerun: RerunSink | Apart | None = None
         self._publisher: Publisher | None = None
         self._published: PublishSink | None = None
         if setup.publish is not None:
@@ -57,13 +61,18 @@ class Outputs:
             self._sinks.append(ArrowSink(folder, geoid_separation_m=separation_m, period_s=period_s))
         if folder is not None or setup.serve is not None:
             self._rerun = _rerun(site, folder, setup)
-            self._sinks.append(Aside(self._rerun) if setup.live else self._rerun)
+            self._sinks.append(Aside(self._rerun) if isinstance(self._rerun, Apart) else self._rerun)
         self._smoothing = Smoothing(site, setup.options, folder) if setup.smooth else None
 
     @property
     def address(self) -> str | None:
         """Where a viewer finds the session while it runs."""
         return self._rerun.address if self._rerun else None
+
+    @property
+    def drawn_by(self) -> int | None:
+        """The number of the process that draws, where there is one."""
+        return self._rerun.process if isinstance(self._rerun, Apart) else None
 
     @property
     def dropped(self) -> int:
@@ -142,11 +151,16 @@ class Outputs:
             raise failure
 
 
-def _rerun(site: Site, folder: Path | None, setup: Setup) -> RerunSink:
+def _rerun(site: Site, folder: Path | None, setup: Setup) -> RerunSink | Apart:
     serve = setup.serve
     period_s, rows_limit = _LIVE if setup.live else _WATCHED if setup.is_watched else _UNWATCHED
+    sink: type[RerunSink | Apart] = Apart
+    if not setup.live:
+        from gateway.sinks.rerun import RerunSink  # knows the viewer, which takes half a second to load
+
+        sink = RerunSink
     try:
-        return RerunSink(
+        return sink(
             site,
             path=None if folder is None else folder / RRD_FILE,
             serve=None if serve is None else (serve.host, serve.port),

@@ -1,7 +1,7 @@
-"""A sink that works in a thread of its own, so that what it takes long to do holds up no picture.
+"""A sink that works in a thread of its own, so that what it waits for holds up no picture.
 
-To draw a hundred aircraft takes a quarter of a second. Between two pictures that is far too long, and most of it is spent
-where the interpreter is free for others.
+To draw a hundred aircraft takes a quarter of a second, in another process (`apart`). Between two pictures that is far too
+long to wait for.
 """
 
 from __future__ import annotations

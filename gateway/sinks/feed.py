@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import errno
 import queue
-import socket
 import struct
 import threading
 from collections.abc import Sequence
@@ -19,6 +18,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from gateway.sinks.scene.entry import Always, Entry, send
+from gateway.sinks.serving import free_port
 
 BATCHES_WAITING = 512  # for a viewer that stands still: some 200 s and 20 MB of them, then they are dropped
 ENTRIES_WAITING = 30_000  # and no more than these, where batches are those of a crowd
@@ -125,7 +125,7 @@ class ServedFeed:
     """
 
     def __init__(self, host: str, port: int, identity: Identity, blueprint: rrb.Blueprint, memory_limit: str) -> None:
-        port = _free_port(host, port)
+        port = free_port(host, port)
         shown = "127.0.0.1" if host in ("0.0.0.0", "::") else host
         self.address = f"rerun+http://{shown}:{port}/proxy"
         self.dropped = 0
@@ -173,15 +173,3 @@ class ServedFeed:
         self._thread.join(STOP_S)
         if not self._thread.is_alive():
             self._stream.disconnect()
-
-
-def _free_port(host: str, port: int) -> int:
-    """The port itself, or a free one for 0; raises OSError when it is taken, which Rerun would only log."""
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(family, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except OSError as error:
-            raise OSError(error.errno, f"the viewer's server cannot use {host}:{port}: {error.strerror}") from error
-        return int(probe.getsockname()[1])

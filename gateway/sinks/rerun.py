@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import uuid
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -92,6 +93,11 @@ class RerunSink:
         self._rows += len(picture.fuse.time) + len(picture.align.report_time) + len(picture.align.plot_time)
         self.flush(picture.now)
 
+    def write_all(self, pictures: Sequence[Picture]) -> None:
+        """Take pictures in their order; raises OSError when the file could not be written."""
+        for picture in pictures:
+            self.write(picture)
+
     def flush(self, now: int) -> None:
         """Draw what waits if a period has passed until `now` (session time, ns) or many rows wait."""
         if self._drawn_at is None:
@@ -110,11 +116,18 @@ class RerunSink:
 
     def close(self) -> None:
         """Draw what waits, end the file, make it small, end the server; calling it again does nothing."""
+        self._end(made_small=True)
+
+    def abandon(self) -> None:
+        """The same, but leave the file as large as it is: the next command that touches the session makes it small."""
+        self._end(made_small=False)
+
+    def _end(self, *, made_small: bool) -> None:
         try:
             self._draw()
         finally:
             try:
-                if self._file and self._file.close():
+                if self._file and self._file.close() and made_small:
                     optimise(self._file.path)
             finally:
                 if self._served:

@@ -45,7 +45,8 @@ class HealthScene:
         samples: list[Sample] = []
         for picture in pictures:
             self._take_plans(picture)
-            if not 0 <= picture.now - self._sampled < SAMPLE_NS:
+            is_told = picture.health.sources or picture.health.vehicles
+            if is_told and not 0 <= picture.now - self._sampled < SAMPLE_NS:
                 self._sampled = picture.now
                 samples += _of_sources(picture)
                 samples += self._of_vehicles(picture)
