@@ -167,7 +167,8 @@ class Work(Arriving):
         seen, alive = associate.compared(self.association.together, at, self.tracks, self.radar_frames, {})
         self.association = replace(self.association, together=seen)
         known, found = self._spans, fuse.spans_with(self.association.ledger.spans, self.lanes.adopted)
-        done = fuse.regrouped(self.lanes, associate.together(alive, seen.one), found, known, self.tracks, at)
+        groups = associate.together(alive, seen.one)
+        done = fuse.regrouped(self.lanes, groups, alive, found, known, self.tracks, at)
         if done.lanes is self.lanes:
             return
         self.events += [Event(at, "info", text) for text in done.told]

@@ -41,12 +41,12 @@ class Continuation:
     lane: Lane
     key: Key
     since: int
-    former: Key | None
+    former: Key | None  # None: nothing is remembered of it
 
     def reason(self) -> str:
         """For people: "radar track 1/7, which was 1/3"."""
         new, old = name_of(self.key), name_of(self.former) if self.former else ""
-        return f"radar track {new}" + (" again" if new == old else f", which was {old}" if old else " goes on with it")
+        return f"radar track {new}" + (" again" if new == old else f", which was {old}" if old else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ def continued(lanes: Lanes, key: Key, scene: Scene, model: Model) -> Continuatio
 def _silent(lanes: Lanes, radar: int, at: int, scene: Scene) -> Iterator[tuple[Lane, Key | None]]:
     """Confirmed tracks that a radar saw lately, but none of its radar tracks since an instant; with the last of these.
 
-    Where other radars see it still, only one that this radar is known to have seen, too.
+    Where other radars see it still, only one that this radar has seen, too.
     """
     longest = int(scene.options.end_after_s * SECOND)
     for lane in lanes.lanes.values():
@@ -94,8 +94,9 @@ def _silent(lanes: Lanes, radar: int, at: int, scene: Scene) -> Iterator[tuple[L
         last = {key: scene.tracks.plots[key][-1].at for key in sorted(keys) if key in scene.tracks.plots}
         if any(seen >= at for seen in last.values()):
             last = {key: seen for key, seen in last.items() if key[0] == radar}
-            if not last or any(seen >= at for seen in last.values()):
-                continue
+            if radar in lane.last.latest and all(seen < at for seen in last.values()):
+                yield lane, max(last, key=lambda key: last[key], default=None)
+            continue
         yield lane, max(last, key=lambda key: last[key]) if last else lane.key
 
 
@@ -204,9 +205,9 @@ def taken_on(lanes: Lanes, found: Continuation, scene: Scene) -> tuple[Lanes, Jo
     if lane.aircraft is not None:
         one = Adopted(found.key, lane.aircraft, found.since, found.former, gps_at=max(found.since, lane.last.gps_at))
         return replace(lanes, adopted=(*lanes.adopted, one)), None
-    if found.former is not None and found.former != lane.key:  # another radar's track that is in it
-        begun = Joint(found.key, lane.name, found.since)
-        return replace(lanes, joints=(*closed(lanes.joints, found.former, found.since), begun)), None
+    if found.former != lane.key:  # that of another radar than its first
+        joints = closed(lanes.joints, found.former, found.since) if found.former is not None else lanes.joints
+        return replace(lanes, joints=(*joints, Joint(found.key, lane.name, found.since))), None
     # Its past cannot be made again from the new radar track's plots, so none of it may be given up.
     lane = replace(lane, key=found.key, ordinal=ordinal_of(scene.spans, found.key, found.since), whole=False)
     plots = sorted(scene.tracks.plots[found.key], key=rank)

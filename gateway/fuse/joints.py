@@ -17,6 +17,7 @@ from gateway.fuse.lanes import Joint, Lane, Lanes, is_alive
 from gateway.track import Key, RadarTracks, name_of
 
 SEEN_WITHIN_S = 10.0  # a position source that was heard this lately speaks for itself
+FOUND_WITHIN_S = 10.0  # so long two radar tracks have until they must be found to be one
 JOINTS_AT_MOST = 20  # of one radar track: what comes and goes more often is left alone
 
 
@@ -86,6 +87,7 @@ def remembered(lanes: Lanes, tracks: RadarTracks, spans: Spans) -> Lanes:
 def regrouped(
     lanes: Lanes,
     groups: Sequence[Sequence[Key]],
+    compared: frozenset[Key],
     found: Spans,
     spans: Spans,
     tracks: RadarTracks,
@@ -93,7 +95,7 @@ def regrouped(
 ) -> Regrouped:
     """Radar tracks that are one target brought into one system track from an instant on, and others out of it.
 
-    `groups`: of those that are compared, which are one. `found`: what reports have associated, and nothing else.
+    `groups`: of those that were compared now, which are one. `found`: what reports have associated, and nothing else.
     """
     sky = _sky(lanes, found, spans, tracks, at)
     joints, told = lanes.joints, list[str]()
@@ -107,12 +109,12 @@ def regrouped(
         if moving:
             names = ", ".join(name_of(key) for key in group)
             told.append(f"radar tracks {names} are one target: {_who(lanes.lanes[target or 0])}")
-    moved = {one.key for one in joints if one.since == at}
+    new = {one.key for one in joints if one.since > at - int(FOUND_WITHIN_S * SECOND)}  # they may not be found yet
     for one in lanes.joints:
         mine = lanes.track_of(one.name)
-        if one.until is not None or one.key in moved or mine is None or sky.home.get(one.key) != mine:
+        if one.until is not None or one.key not in compared - new or mine is None or sky.home.get(one.key) != mine:
             continue
-        others = [key for key in sky.alive[mine] if key != one.key and key not in moved]
+        others = [key for key in sky.alive[mine] if key != one.key and key in compared - new]
         if others and not any(group_of.get(key, -1) == group_of.get(one.key, -2) for key in others):
             joints = closed(joints, one.key, at)
             names = ", ".join(name_of(key) for key in others)
