@@ -63,7 +63,7 @@ class Making:
         separation_m = self.geoid.separation_m
         self.lanes, rows, fresh = fuse.work(self.lanes, jobs, self._spans, separation_m, self.model)
         self.rows += rows
-        self.consistency = self.consistency.hearing(event for _, event in fresh)
+        self.consistency = self.consistency.hearing(fresh)
         outliers = sum(event.outlying for _, event in fresh)
         if outliers:
             self.count("outliers, their pull bounded", outliers)

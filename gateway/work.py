@@ -48,7 +48,8 @@ class Work(Arriving):
         """Ends, coasting, predictions, what scatters otherwise than stated, and forgetting what is older than the history."""
         self._settle()
         self._join_radars(at)
-        self.consistency, findings = self.consistency.judged(self.site.position, self.radars, at)
+        judged = self.consistency.judged(self.site.position, self.radars, self.radar_frames, at)
+        self.consistency, findings = judged
         for found in findings:
             self._say_scatter(found)
         lanes, ended = fuse.end_silent(self.lanes, at, self.options)

@@ -1,15 +1,11 @@
-"""Whether sources scatter as much as the settings say: a running test of what the filter did not expect.
+"""Whether sources scatter as much as the settings say: a running test of each source's noise, part by part.
 
-Looked at are changes from one innovation to the next of the same track and source, over the last thousand or so of each
-source and component. A filter that lags behind a manoeuvre, and a source with a constant error, are wrong in the same way for
-seconds: changes do not see that, noise they do.
+What is looked at is what `scatter` leaves over of a measurement beside its neighbours; `evidence` sums up what that tells.
+Something is said at a level that grows with the number of noises watched, so that among thousands none is suspected by
+chance. Aircraft whose noise the site file states are also judged together: that is sooner sure.
 
-too small   they are larger than innovations should scatter by (S), each bounded: a turn's first second is a large change
-too large   they are smaller than the stated noise alone (R). However a target moves and whatever the filter thinks, a change
-            holds the noise of both measurements: only noise that is less than stated makes it small
-
-What a stream says of its own accuracy is only held against the first: a receiver's error that lasts is part of that, and the
-track follows it. For the same reason nothing is said of a receiver whose reports hardly change against each other.
+What a stream says of its own accuracy is never found too careful: a receiver's error that lasts is part of it. For the same
+reason nothing is said of a receiver whose reports hardly scatter.
 """
 
 from __future__ import annotations
@@ -21,92 +17,26 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.align import Fix, Plot
-from gateway.fuse.events import Event, Measure, Residual
+from gateway.align import SECOND, Fix, Plot
+from gateway.frames import RadarFrame
+from gateway.fuse.events import Event, Measure
+from gateway.fuse.evidence import ENOUGH, PLOT, REPORT, Part, Sums, evidence
+from gateway.fuse.scatter import left_of_plots, left_of_reports, rows_of
 from gateway.settings import PositionSource, RadarSite
 
 Floats = NDArray[np.float64]
 
-MEMORY = 1000.0  # measurements: older ones fade
-LEAST = 60.0  # measurements before anything is said
-# Standard deviations, so that among thousands of sources none is suspected by chance; the lower end of chi-square is the
-# steeper one, and an honest source is some way above it.
-SURE_TOO_SMALL, SURE_TOO_LARGE = 4.0, 3.0
-TOO_SMALL, TOO_LARGE = 1.45, 0.72  # of squares: what a model of motion is off by is not the noise's fault
-MOST, BOUNDED_MEAN = 4.0, 0.9205  # of squares, and the mean of a square of unit variance that is bounded so
-LASTING = 0.3  # a receiver whose reports change by less than this share of what is stated has errors that last
+SURE = 12.0  # evidence that is sure of a single noise; of many, the logarithm of their number more
+LASTING = 0.3  # a receiver whose reports scatter by less than this share of what is stated has errors that last
+TOGETHER_AT_LEAST, TOGETHER_ENOUGH = 3, 4.0 * ENOUGH  # aircraft, and squares of theirs, which are many soon
+KEPT_PLOTS, KEPT_REPORTS = 6, 3  # of each track and source, to hold the next ones against
+KEPT_NS = 30 * SECOND
 SOURCES_AT_MOST = 4096  # the least lately heard are forgotten
-FORGOTTEN_NS = 3_600_000_000_000  # and those that were not heard for so long
+FORGOTTEN_NS = 3600 * SECOND  # and those that were not heard for so long
 
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """Which components of a measurement share one noise, and where that is set: a key in a table of the site file."""
-
-    name: str
-    first: int
-    last: int
-    key: str
-    unit: str
-    per_unit: float = 1.0  # of what is inside for one in the file
-
-
-REPORT = (
-    Part("position", 0, 3, "sigma_m", "m"),
-    Part("velocity", 3, 6, "velocity_sigma_mps", "m/s"),
-)
-PLOT = (
-    Part("range", 0, 1, "range_sigma_m", "m"),
-    Part("azimuth", 1, 2, "azimuth_sigma_deg", "degrees", math.pi / 180.0),
-    Part("elevation", 2, 3, "elevation_sigma_deg", "degrees", math.pi / 180.0),
-)
-
-
-@dataclass(frozen=True, slots=True)
-class Sums:
-    """Faded sums over the changes of one component, by sqrt 2: how many, and their squares."""
-
-    count: float = 0.0
-    by_scatter: float = 0.0  # of innovations by what they should scatter by
-    bounded: float = 0.0  # the same with each square at most MOST, by what that makes of a mean of 1
-    by_noise: float = 0.0  # of innovations by the stated noise
-
-    def then(self, residual: Residual, some: slice, sigma: float) -> Sums:
-        """The same after some components of a measurement whose noise is stated as `sigma`."""
-        by_scatter, by_noise = residual.change_by_scatter[None, some], residual.change[None, some]
-        return self.plus(*_squares(by_scatter, by_noise, np.array([sigma]))[0])
-
-    def plus(self, count: float, by_scatter: float, bounded: float, by_noise: float) -> Sums:
-        """The same with the sums over a measurement's components, of which so many are known."""
-        keep = 1.0 - count / MEMORY
-        return Sums(
-            keep * self.count + count,
-            keep * self.by_scatter + by_scatter,
-            keep * self.bounded + bounded,
-            keep * self.by_noise + by_noise,
-        )
-
-    @property
-    def factor(self) -> float | None:
-        """How many times as much as stated it scatters, once that is sure; None = as stated, as far as can be told."""
-        if self.count < LEAST:
-            return None
-        chance = math.sqrt(3.0 / self.count)  # changes that follow each other share a measurement
-        if self.bounded / self.count > max(TOO_SMALL, 1.0 + SURE_TOO_SMALL * chance):
-            return math.sqrt(self.by_scatter / self.count)
-        if self.by_noise / self.count < min(TOO_LARGE, 1.0 - SURE_TOO_LARGE * chance):
-            return math.sqrt(min(self.by_scatter, self.by_noise) / self.count)
-        return None
-
-
-def _squares(by_scatter: Floats, change: Floats, sigma: Floats) -> list[list[float]]:
-    """What n measurements of some components (n, c) with stated noise (n,) add to `Sums`: n rows for `Sums.plus`."""
-    known = by_scatter == by_scatter
-    scatter = np.where(known, by_scatter * by_scatter, 0.0)
-    noise = np.where(known, (change / sigma[:, None]) ** 2, 0.0)
-    bounded = np.minimum(scatter, MOST) / BOUNDED_MEAN
-    rows: list[list[float]] = np.stack([part.sum(axis=1) for part in (known, scatter, bounded, noise)], axis=1).tolist()
-    return rows
+Key = tuple[str, str, bool]  # source, part, whether the site file sets its noise
+Group = tuple[int, int]  # track, and radar or 0 for reports
+ALL = "GPS"  # the source that all aircraft together are
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,75 +48,154 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
+class Told:
+    """What a second's measurements tell of one noise: the sums of `evidence`, and what is stated of it."""
+
+    measure: Measure
+    part: Part
+    sigma: float
+    added: Floats  # (9,)
+
+
+@dataclass(frozen=True, slots=True)
 class Consistency:
-    """What is known of each source and component, the least lately heard first; and the measurements of the last second."""
+    """What is known of each source and part, the least lately heard first; and the measurements of the last second."""
 
-    sums: Mapping[tuple[str, str, bool], Sums] = field(
-        default_factory=dict
-    )  # source, part, whether the site file sets it
-    waiting: tuple[Event, ...] = ()
+    sums: Mapping[Key, Sums] = field(default_factory=dict)
+    waiting: tuple[tuple[int, Event], ...] = ()
     heard: Mapping[str, int] = field(default_factory=dict)  # when each source was last
+    recent: Mapping[Group, tuple[Event, ...]] = field(default_factory=dict)
 
-    def hearing(self, events: Iterable[Event]) -> Consistency:
-        """The same with new measurements waiting to be judged."""
-        told = (event for event in events if event.residual is not None)
-        return Consistency(self.sums, (*self.waiting, *told), self.heard)
+    def hearing(self, events: Iterable[tuple[int, Event]]) -> Consistency:
+        """The same with new measurements waiting to be judged, each with its track."""
+        return Consistency(self.sums, (*self.waiting, *events), self.heard, self.recent)
 
     def judged(
-        self, position: PositionSource, radars: Mapping[int, RadarSite], at: int = 0
+        self,
+        position: PositionSource,
+        radars: Mapping[int, RadarSite],
+        frames: Mapping[int, RadarFrame],
+        at: int = 0,
     ) -> tuple[Consistency, list[Finding]]:
-        """The same with what waited worked in, in order of arrival, and what is sure by now, once of each.
+        """The same with what waited worked in, and what is sure by now of the sources that were just heard.
 
         Sources that were not heard for an hour before `at` are forgotten.
         """
-        sums, heard, found = dict(self.sums), dict(self.heard), dict[tuple[str, str], Finding]()
-        waiting = sorted(self.waiting, key=lambda event: event.measure.serial)
-        parts = _parts([event for event in waiting if isinstance(event.measure, Fix)])
-        parts |= _parts([event for event in waiting if isinstance(event.measure, Plot)])
-        for event in waiting:
-            measure = event.measure
-            source = f"GPS of {measure.aircraft}" if isinstance(measure, Fix) else f"radar {measure.radar}"
-            heard[source] = event.at
-            usual = _usual(measure, position, radars)
-            for (part, stated, added), said in zip(parts[measure.serial], usual, strict=True):
-                is_set = said is not None and math.isclose(stated, said, rel_tol=1e-9)
-                key = source, part.name, is_set
-                after = sums[key] = sums.pop(key, NOTHING).plus(*added)
-                if (source, part.name) not in found:
-                    factor = after.factor
-                    told_least = 0.0 if isinstance(measure, Plot) else LASTING
-                    if factor is not None and (factor > 1.0 or (is_set and factor > told_least)):
-                        found[source, part.name] = _finding(measure, source, part, stated, factor, is_set)
-        while len(sums) > SOURCES_AT_MOST:
-            oldest = next(iter(sums))
-            del sums[oldest]
-            heard.pop(oldest[0], None)
-        gone = {source for source, last in heard.items() if last < at - FORGOTTEN_NS}
-        if gone:
-            sums = {key: one for key, one in sums.items() if key[0] not in gone}
-            heard = {source: last for source, last in heard.items() if source not in gone}
-        return Consistency(sums, heard=heard), list(found.values())
+        groups, recent = self._grouped(at)
+        told: dict[Key, Told] = {}
+        for plots in (False, True):
+            chosen = [group for key, group in groups.items() if (key[1] != 0) == plots]
+            if chosen:
+                told |= _told(chosen, position, radars, frames)
+        sums, heard = dict(self.sums), dict(self.heard)
+        for key, one in told.items():
+            sums[key] = sums.pop(key, Sums()).plus(one.added.tolist())
+            heard[key[0]] = one.measure.at
+        sure = SURE + math.log(max(len(sums), 1))
+        for key, one in _together(told, sums, sure).items():
+            sums[key] = sums.pop(key, Sums()).plus(one.added.tolist())
+            told[key], heard[key[0]] = one, one.measure.at
+        found = _findings(told, sums, sure)
+        _forget(sums, heard, at)
+        return Consistency(sums, heard=heard, recent=recent), found
+
+    def _grouped(self, at: int) -> tuple[dict[Group, tuple[list[Event], int]], dict[Group, tuple[Event, ...]]]:
+        """What waited, in order behind what was kept of the same track and source (how many); and what is kept of it now.
+
+        What comes too late to be in order tells nothing.
+        """
+        arrived: dict[Group, list[Event]] = {}
+        for track, event in sorted(self.waiting, key=lambda one: one[1].measure.serial):
+            source = event.measure.radar if isinstance(event.measure, Plot) else 0
+            arrived.setdefault((track, source), []).append(event)
+        recent = {key: kept for key, kept in self.recent.items() if kept[-1].at > at - KEPT_NS}
+        groups = {}
+        for key, events in arrived.items():
+            known = recent.pop(key, ())
+            row = list(known)
+            for event in sorted(events, key=lambda one: one.at):
+                if not row or event.at > row[-1].at:
+                    row.append(event)
+            if len(row) > len(known):
+                groups[key] = row, len(known)
+            recent[key] = tuple(row[-(KEPT_PLOTS if key[1] else KEPT_REPORTS) :])
+        return groups, recent
 
 
-NOTHING = Sums()
-Told = tuple[Part, float, list[float]]  # of one part of a measurement: the stated sigma, and what it adds to the sums
+def _told(
+    groups: Sequence[tuple[list[Event], int]],
+    position: PositionSource,
+    radars: Mapping[int, RadarSite],
+    frames: Mapping[int, RadarFrame],
+) -> dict[Key, Told]:
+    """What the new measurements of some groups of one kind, reports or plots, tell."""
+    rows, events = rows_of(groups), [event for group, _ in groups for event in group]
+    is_plot = isinstance(events[0].measure, Plot)
+    left = left_of_plots(rows, events, frames) if is_plot else left_of_reports(rows)
+    fresh = np.flatnonzero(rows.new)
+    left, new = left.of(fresh), [events[row] for row in fresh.tolist()]
+    stated = np.array([_stated(event.measure) for event in new])
+    said = [_said(event.measure, position, radars) for event in new]
+    sources = [_source(event.measure) for event in new]
+    found: dict[Key, Told] = {}
+    for number, part in enumerate(PLOT if is_plot else REPORT):
+        amounts = evidence(left, new, stated[:, number], part)
+        keys = [
+            (source, part.name, math.isclose(sigma, one[number], rel_tol=1e-9))
+            for source, sigma, one in zip(sources, stated[:, number].tolist(), said, strict=True)
+        ]
+        places = {key: place for place, key in enumerate(dict.fromkeys(keys))}
+        added = np.zeros((len(places), amounts.shape[1]))
+        np.add.at(added, [places[key] for key in keys], amounts)
+        last = {key: row for row, key in enumerate(keys)}
+        for key, place in places.items():
+            row = last[key]
+            found[key] = Told(new[row].measure, part, float(stated[row, number]), added[place])
+    return found
 
 
-def _parts(events: Sequence[Event]) -> dict[int, list[Told]]:
-    """What measurements of one kind tell, by their serial numbers: all of a second in one go."""
-    if not events:
-        return {}
-    residuals = [event.residual for event in events if event.residual is not None]
-    by_scatter = np.array([one.change_by_scatter for one in residuals])
-    change = np.array([one.change for one in residuals])
-    sigma = np.array([_stated(event.measure) for event in events])
-    columns = []
-    for number, part in enumerate(REPORT if isinstance(events[0].measure, Fix) else PLOT):
-        some = slice(part.first, part.last)
-        added = _squares(by_scatter[:, some], change[:, some], sigma[:, number])
-        columns.append([(part, *one) for one in zip(sigma[:, number].tolist(), added, strict=True)])
-    told = zip(*columns, strict=True)
-    return {event.measure.serial: list(one) for event, one in zip(events, told, strict=True)}
+def _together(told: Mapping[Key, Told], sums: Mapping[Key, Sums], sure: float) -> dict[Key, Told]:
+    """All aircraft whose noise the site file states as one source, but for those that already are known to be off."""
+    found = {}
+    for part in REPORT:
+        chosen = [key for key, one in told.items() if key[2] and one.part is part]
+        if len(chosen) >= TOGETHER_AT_LEAST:
+            added = [told[key].added for key in chosen if sums[key].factor(sure) is None]
+            first = told[chosen[0]]
+            whole = np.sum(added, axis=0) if added else np.zeros_like(first.added)
+            found[ALL, part.name, True] = Told(first.measure, part, first.sigma, whole)
+    return found
+
+
+def _findings(told: Mapping[Key, Told], sums: Mapping[Key, Sums], sure: float) -> list[Finding]:
+    """What is sure of sources that were just heard; of single aircraft only what is not so of all."""
+    found = {}
+    for key, one in told.items():
+        factor = sums[key].factor(sure, TOGETHER_ENOUGH if key[0] == ALL else ENOUGH)
+        least = 0.0 if isinstance(one.measure, Plot) else LASTING
+        if factor is not None and (factor > 1.0 or (key[2] and factor > least)):
+            found[key] = _finding(key, one, factor)
+    for part in REPORT:
+        if (ALL, part.name, True) in found:
+            found = {key: one for key, one in found.items() if key[1:] != (part.name, True) or key[0] == ALL}
+    return list({key[:2]: one for key, one in found.items()}.values())
+
+
+def _forget(sums: dict[Key, Sums], heard: dict[str, int], at: int) -> None:
+    while len(sums) > SOURCES_AT_MOST:
+        oldest = next(iter(sums))
+        del sums[oldest]
+        heard.pop(oldest[0], None)
+    gone = {source for source, last in heard.items() if last < at - FORGOTTEN_NS}
+    if gone:
+        for key in [key for key in sums if key[0] in gone]:
+            del sums[key]
+        for source in gone:
+            del heard[source]
+
+
+def _source(measure: Measure) -> str:
+    return f"GPS of {measure.aircraft}" if isinstance(measure, Fix) else f"radar {measure.radar}"
 
 
 def _stated(measure: Measure) -> tuple[float, ...]:
@@ -194,24 +203,28 @@ def _stated(measure: Measure) -> tuple[float, ...]:
     return measure.sigma if isinstance(measure, Plot) else (float(measure.sigma_m[0]), measure.velocity_sigma_mps)
 
 
-def _usual(measure: Measure, position: PositionSource, radars: Mapping[int, RadarSite]) -> tuple[float | None, ...]:
-    """The sigma of each part that the site file sets."""
+def _said(measure: Measure, position: PositionSource, radars: Mapping[int, RadarSite]) -> tuple[float, ...]:
+    """The sigma of each part that the site file sets, NaN = none."""
     if isinstance(measure, Fix):
         return position.sigma_m, position.velocity_sigma_mps
     radar = radars.get(measure.radar)
     if radar is None:
-        return None, None, None
+        return math.nan, math.nan, math.nan
     return radar.range_sigma_m, radar.azimuth_sigma_rad, radar.elevation_sigma_rad
 
 
-def _finding(measure: Measure, source: str, part: Part, sigma: float, factor: float, is_set: bool) -> Finding:
-    topic = f"scatter of {part.name}, {source}"
-    text = f"{source}: its {part.name} scatters {factor:.2g} times as much as "
-    stated = sigma / part.per_unit
+def _finding(key: Key, told: Told, factor: float) -> Finding:
+    source, name, is_set = key
+    part, stated = told.part, told.sigma / told.part.per_unit
+    topic = f"scatter of {name}, {source}"
+    text = f"{source}: its {name} scatters {factor:.2g} times as much as "
+    if source == ALL:
+        text = f"{source}: the {name} of the aircraft here scatters {factor:.2g} times as much as "
     if not is_set:
         return Finding(
             topic, f"{text}its stream says ({stated:.3g} {part.unit}): tracks are less sure than they are told to be"
         )
+    measure = told.measure
     table = f"the [[radar]] number {measure.radar}" if isinstance(measure, Plot) else "[position]"
-    text += f"its stated {stated:.3g} {part.unit}: set {part.key} = {stated * factor:.2g} in {table} of the site file"
+    text += f"the stated {stated:.3g} {part.unit}: set {part.key} = {stated * factor:.2g} in {table} of the site file"
     return Finding(topic, text)

@@ -1,4 +1,4 @@
-"""Whether tracks are as sure as they say: NEES and NIS over many runs, second by second, and what the program finds by itself.
+"""Whether tracks are as sure as they say: NEES and NIS over many runs, second by second.
 
 NEES is the squared error of the position by the covariance that is told, NIS the squared innovation by what it should
 scatter by. Over n runs their means lie in an interval that chi-square gives; a filter is honest in a second if they do.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +17,8 @@ from scipy.stats import chi2
 
 from gateway.estimators import modes
 from gateway.estimators.kalman import Estimate, Innovation, predict
-from gateway.fuse.consistency import PLOT, REPORT, Sums
-from gateway.fuse.events import Residual
 from gateway.fuse.weighting import Model, start_from_fixes, update_with_fixes, update_with_plots
-from gateway.settings import Estimation, EstimatorName, Options, Site
+from gateway.settings import Estimation, EstimatorName, Options
 from sim.studies import Progress, Study, Table, silent
 from sim.studies.ensembles import Ensemble, Step, approach, traffic, two_turns
 
@@ -29,8 +27,6 @@ Bools = NDArray[np.bool_]
 
 ESTIMATORS: tuple[EstimatorName, ...] = ("kalman", "imm", "rmimm")
 INSIDE = 0.95  # of the means of an honest filter
-WRONG = 1.5  # by how much settings are wrong
-AGAINST = 40  # runs that the program's own test is held against: it looks at one run at a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +38,6 @@ class Followed:
     nees: Floats
     nis: Floats
     degrees: NDArray[np.int64]
-    residuals: tuple[
-        tuple[int, Floats, Floats], ...
-    ]  # radar, innovations (runs, k), NaN = not measured, by their scatter
-    sigmas: dict[int, Floats]  # as stated, (k,) by radar, 0 = of reports
 
     def rmse_m(self, since_s: float) -> float:
         """Of the position, over all runs."""
@@ -64,7 +56,7 @@ class Seconds:
 
 
 def run(runs: int = 100, seed: int = 1, *, rrd: Path | None = None, progress: Progress = silent) -> Study:
-    """Shares of the seconds in which mean NEES and NIS are inside, by case and estimator, and what the program says.
+    """Shares of the seconds in which mean NEES and NIS are inside, by case and estimator.
 
     `rrd`: where NEES and NIS are drawn second by second, or None.
     """
@@ -79,21 +71,19 @@ def run(runs: int = 100, seed: int = 1, *, rrd: Path | None = None, progress: Pr
     drawn: dict[str, Seconds] = {}
     for place, (name, ensembles) in enumerate(cases.items()):
         for turn, estimator in enumerate(ESTIMATORS):
-            progress(f"{name}, {estimator}", (place + turn / len(ESTIMATORS)) / (len(cases) + 1))
+            progress(f"{name}, {estimator}", (place + turn / len(ESTIMATORS)) / len(cases))
             each = [(one, follow(one, model_of(one, Options(estimator=estimator)))) for one in ensembles]
             found = joined([by_second(followed, one) for one, followed in each])
             drawn[f"{name}/{estimator}"] = found
             rows.append((name, estimator, *_cells(found), _rmse_m(each)))
             figures |= {f"NEES {name}, {estimator}": float(found.nees_inside.mean())}
             figures |= {f"NIS {name}, {estimator}": float(found.nis_inside.mean())}
-    progress("settings wrong by 1.5", len(cases) / (len(cases) + 1))
-    table, said = _settings(min(runs, AGAINST), seed)
     if rrd is not None:
         from sim.studies.consistency_figures import draw
 
         draw(rrd, drawn, runs)
     shown = Table(f"mean NEES of the position and NIS over {runs} runs, second by second", COLUMNS, tuple(rows), NOTES)
-    return Study("consistency", runs, seed, (shown, table), figures | said, str(rrd) if rrd else None)
+    return Study("consistency", runs, seed, (shown,), figures, str(rrd) if rrd else None)
 
 
 COLUMNS = (
@@ -140,7 +130,7 @@ def follow(ensemble: Ensemble, model: Model) -> Followed:
     place, sigma = np.where(np.isnan(first.value), 0.0, first.value), np.tile(sigmas[0], (runs, 1))
     state = start_from_fixes(place, sigma[:, :3], first.velocity, sigma[:, 3], model)
     mixture = None if model.modes is None else modes.begin(state, model.modes)
-    at_s, off, nees, nis, degrees, residuals = first.at_s, [], [], [], [], []
+    at_s, off, nees, nis, degrees = first.at_s, [], [], [], []
     for step in ensemble.steps[1:]:
         elapsed_s, at_s = np.full(runs, step.at_s - at_s), step.at_s
         if mixture is None or model.modes is None:
@@ -157,10 +147,8 @@ def follow(ensemble: Ensemble, model: Model) -> Followed:
         nees.append(_normalised(wrong, state.covariance[:, :axes, :axes]))
         nis.append(_normalised(innovation, scatter))
         degrees.append(measured.sum(axis=1))
-        known, along = np.where(measured, innovation, np.nan), np.arange(innovation.shape[1])
-        residuals.append((step.radar, known, known / np.sqrt(scatter[:, along, along])))
     times = np.array([step.at_s for step in ensemble.steps[1:]])
-    return Followed(times, np.array(off), np.array(nees), np.array(nis), np.array(degrees), tuple(residuals), sigmas)
+    return Followed(times, np.array(off), np.array(nees), np.array(nis), np.array(degrees))
 
 
 def _sigmas(ensemble: Ensemble) -> dict[int, Floats]:
@@ -214,55 +202,3 @@ def joined(parts: Sequence[Seconds]) -> Seconds:
         np.concatenate([part.nis for part in parts]),
         np.concatenate([part.nis_inside for part in parts]),
     )
-
-
-def findings(followed: Followed, index: int) -> dict[str, float]:
-    """What the program's own test (`gateway.fuse.consistency`) finds in one run: the first factor of each component."""
-    sums: dict[str, Sums] = {}
-    latest: dict[int, Residual] = {}
-    found: dict[str, float] = {}
-    for radar, innovation, by_scatter in followed.residuals:
-        latest[radar] = Residual.after(latest.get(radar), innovation[index], by_scatter[index])
-        for part in PLOT if radar else REPORT:
-            some, sigma = slice(part.first, part.last), float(followed.sigmas[radar][part.first])
-            sums[part.name] = sums.get(part.name, Sums()).then(latest[radar], some, sigma)
-            factor = sums[part.name].factor
-            if factor is not None:
-                found.setdefault(part.name, factor)
-    return found
-
-
-def _settings(runs: int, seed: int) -> tuple[Table, dict[str, float]]:
-    """In how many runs the program says that a noise is wrong: none is, and each in turn by 1.5, either way."""
-    rows: list[tuple[str | float, ...]] = []
-    figures: dict[str, float] = {}
-    base = approach(runs, seed)
-    for estimator in ("kalman", "rmimm"):
-        options = Options(estimator=estimator)
-        for part in (None, REPORT[0], *PLOT):
-            for stated in (1.0,) if part is None else (1.0 / WRONG, WRONG):
-                ensemble = base if part is None else _stated(base, part.key, stated)
-                followed = follow(ensemble, model_of(ensemble, options))
-                each = [findings(followed, index) for index in range(runs)]
-                right = [one for one in each if part is not None and part.name in one]
-                wrong = [one for one in each if any(part is None or name != part.name for name in one)]
-                told = float(np.mean([one[part.name] for one in right])) if part is not None and right else math.nan
-                name = "every noise as stated" if part is None else f"{part.name} stated {stated:.2f} times"
-                share = math.nan if part is None else 100.0 * len(right) / runs
-                rows.append((name, estimator, share, told, 100.0 * len(wrong) / runs))
-                figures |= {
-                    f"found {name}, {estimator}": share,
-                    f"false {name}, {estimator}": 100.0 * len(wrong) / runs,
-                }
-    columns = ("003's approach", "estimator", "said %", "factor", "others %")
-    return Table(f"what the program says of its own settings, {runs} runs", columns, tuple(rows)), figures
-
-
-def _stated(ensemble: Ensemble, key: str, factor: float) -> Ensemble:
-    """The same measurements with one noise stated so many times what it is."""
-    if key == "sigma_m":
-        return replace(ensemble, position=replace(ensemble.position, sigma_m=factor * ensemble.position.sigma_m))
-    site: Site = ensemble.site
-    inside = key.replace("_deg", "_rad")
-    radars = tuple(replace(radar, **{inside: factor * getattr(radar, inside)}) for radar in site.radars)
-    return replace(ensemble, site=replace(site, radars=radars))

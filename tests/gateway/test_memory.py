@@ -158,11 +158,17 @@ def test_numbers_of_radar_tracks_are_forgotten_and_never_mixed_up(world: Any) ->
 def test_of_many_aircraft_that_scatter_otherwise_than_stated_the_first_are_named(
     world: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each of six scatters by 60 m where 15 are stated: two are named, then it is said once that there are more."""
+    """Each of six scatters by 60 m and says 20: two are named, then it is said once that there are more."""
     monkeypatch.setattr(work, "NAMED_AT_MOST", 2)
     random = np.random.default_rng(1)
     said = [
-        world.report(world.Course(), t_s, aircraft=f"icao:{k:06x}", off_m=random.normal(0.0, 60.0, 3))
+        world.report(
+            world.Course(),
+            t_s,
+            aircraft=f"icao:{k:06x}",
+            off_m=random.normal(0.0, 60.0, 3),
+            horizontal_sigma_m=20.0,
+        )
         for t_s in np.arange(0.1, 60.0, 1.0).tolist()
         for k in range(6)
     ]

@@ -1,0 +1,131 @@
+"""Evidence on one noise: sums that grow while measurements scatter otherwise than stated, and by how much they do.
+
+For each noise run sums of evidence, for 1.5 times what is stated and for 1.5 times less: the logarithm of how much likelier
+that makes what was measured. A sum that falls below nothing begins anew (Page's CUSUM), so that it does not matter since
+when a setting is wrong. Where noise is as stated a sum reaches L by chance once in exp(L) measurements or more seldom.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.fuse.events import Event
+from gateway.fuse.scatter import PAIR, Left
+
+Floats = NDArray[np.float64]
+
+WRONG = 1.5  # what is looked for, either way
+# Squares beyond tell nothing: they are outliers, turns and lost tracks. Of noise that is less than stated small ones tell.
+FAR_UP, FAR_DOWN = 12.0, 6.0
+LEAST, FARTHEST = 1e-6, 144.0  # squares that tell by how much it is wrong
+ENOUGH = (
+    150.0  # of these tell it to a seventh; fewer that make sure of it were large by chance, and would tell too much
+)
+LOG_OF_SQUARE = -1.2704  # mean logarithm of a normal deviate's square
+DISTURBED = 0.3  # of the noise's variance, by a hard manoeuvre that never ends: not yet taken for 1.5 times the noise
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Which components of a measurement share one noise, and where that is set: a key in a table of the site file."""
+
+    name: str
+    first: int
+    last: int
+    key: str
+    unit: str
+    per_unit: float = 1.0  # of what is inside for one in the file
+
+    @property
+    def components(self) -> slice:
+        """Of a measurement's components, those of this part."""
+        return slice(self.first, self.last)
+
+
+REPORT = (
+    Part("position", 0, 3, "sigma_m", "m"),
+    Part("velocity", 3, 6, "velocity_sigma_mps", "m/s"),
+)
+PLOT = (
+    Part("range", 0, 1, "range_sigma_m", "m"),
+    Part("azimuth", 1, 2, "azimuth_sigma_deg", "degrees", math.pi / 180.0),
+    Part("elevation", 2, 3, "elevation_sigma_deg", "degrees", math.pi / 180.0),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Sum:
+    """One sum of evidence since it was last nothing: its level, how many squares came in, and the sum of their logarithms."""
+
+    level: float = 0.0
+    count: float = 0.0
+    logs: float = 0.0
+
+    def plus(self, evidence: float, count: float, logs: float) -> Sum:
+        """The same with the evidence of some squares."""
+        level = self.level + evidence
+        return Sum(level, self.count + count, self.logs + logs) if level > 0.0 else NOTHING
+
+    @property
+    def factor(self) -> float:
+        """How many times as much as stated it scatters: a mean that single large squares hardly move."""
+        return math.exp(0.5 * (self.logs / max(self.count, 1.0) - LOG_OF_SQUARE))
+
+
+NOTHING = Sum()
+
+
+@dataclass(frozen=True, slots=True)
+class Sums:
+    """The evidence on one noise: for more than stated, and for less, by the source itself and by the filter."""
+
+    more: Sum = NOTHING
+    less: Sum = NOTHING
+    less_by_filter: Sum = NOTHING
+
+    def plus(self, told: Sequence[float]) -> Sums:
+        """The same with what some measurements told, nine numbers of `evidence`."""
+        return Sums(self.more.plus(*told[0:3]), self.less.plus(*told[3:6]), self.less_by_filter.plus(*told[6:9]))
+
+    def factor(self, sure: float, enough: float = ENOUGH) -> float | None:
+        """How many times as much as stated it scatters, where evidence is above a level; None = as stated, or not sure."""
+        if self.more.level > sure and self.more.count >= enough:
+            return self.more.factor
+        found = [one.factor for one in (self.less, self.less_by_filter) if one.level > sure and one.count >= enough]
+        return min(found, default=None)
+
+
+def evidence(left: Left, events: Sequence[Event], sigma: Floats, part: Part) -> Floats:
+    """What each of n measurements tells of one part with stated noise (n,): (n, 9), three numbers for each of `Sums`.
+
+    `left`: what `scatter` leaves over of them. Where that would be disturbed by manoeuvres the filter's innovations take its
+    place, as changes from one to the next: by what they should scatter by (S) to find more noise than stated, and by the
+    stated noise alone (R) to find less: however a target moves, they hold the noise of both measurements.
+    """
+    some = part.components
+    own, share = np.square(left.by_noise[:, some]), left.share[:, some]
+    calm = left.disturbed[:, some] < DISTURBED
+    nothing = np.full(own.shape[1], math.nan)
+    told = [event.residual for event in events]
+    by_scatter = np.array([nothing if one is None else one.change_by_scatter[some] for one in told])
+    change = np.array([nothing if one is None else one.change[some] for one in told]) / sigma[:, None]
+    columns = (
+        *_counted(np.where(calm, own, np.square(by_scatter)), np.where(calm, share, PAIR), FAR_UP),
+        *_counted(own, share, FAR_DOWN),
+        *_counted(np.where(calm, math.nan, np.square(change)), np.full(share.shape, PAIR), FAR_DOWN),
+    )
+    return np.stack(columns, axis=1)
+
+
+def _counted(square: Floats, share: Floats, far: float) -> tuple[Floats, Floats, Floats]:
+    """Evidence of squares (n, c) for noise that is wrong one way or the other, how many there are, their logarithms, (n,)."""
+    near, known = square < far, square < FARTHEST  # False for NaN
+    times = WRONG if far == FAR_UP else 1.0 / WRONG
+    told = np.where(near, share * (0.5 * (1.0 - 1.0 / times**2) * square - math.log(times)), 0.0)
+    logs = np.log(np.where(known, np.maximum(square, LEAST), 1.0))
+    return told.sum(axis=1), known.sum(axis=1, dtype=np.float64), logs.sum(axis=1)
