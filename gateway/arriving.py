@@ -79,7 +79,7 @@ class Arriving(Making):
                 f"counted, not used; add [[radar]] with number = {observation.radar} to the site file"
             )
             return None
-        plot = align.place_plot(observation, self.serial, radar, self.registration.of(radar))
+        plot = align.place_plot(observation, self.serial, radar, self.registration.of(radar, observation.valid_at))
         self.plots.append(plot)
         return None if observation.timing is Timing.FOREIGN else plot
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from gateway import align, associate, fuse, predict, track
+from gateway import align, associate, fuse, predict, register, track
 from gateway.align import SECOND, Fix, Plot
 from gateway.associate import Change, Setting, Spans
 from gateway.frames import RadarFrame
@@ -15,6 +15,7 @@ from gateway.fuse.rows import Row
 from gateway.fuse.weighting import Model
 from gateway.observation import Heard, Truth
 from gateway.picture import Event, Health, Picture, SourceHealth
+from gateway.register import Residuals
 from gateway.state import State
 
 SAID_AT_MOST = 500  # a bound on what strangers can make us remember
@@ -34,6 +35,7 @@ class Making:
         self.consistency = state.consistency
         self.history = int(state.options.history_s * SECOND)
         self.wait = int(state.options.association_wait_s * SECOND)
+        self.events: list[Event] = []
         self._see_radars()
         self.fixes: list[Fix] = []
         self.plots: list[Plot] = []
@@ -43,8 +45,8 @@ class Making:
         self.ended: list[Ended] = []
         self.lived: list[LifeChange] = []
         self.settled: list[Settled] = []
+        self.residuals: list[Residuals] = []
         self.forecasts: list[predict.Forecast] = []
-        self.events: list[Event] = []
         self.jobs: dict[int, Job] = {}
         self._both: tuple[Spans, tuple[Adopted, ...], tuple[Joint, ...], Spans] = (Spans(), (), (), Spans())
         self.untracked = 0
@@ -89,6 +91,10 @@ class Making:
         self.radar_frames = {number: RadarFrame.of(radar, self.frame) for number, radar in self.radars.items()}
         self.model = Model.of(self.options, self.site.position, self.radar_frames, self.site.estimation)
         self.setting = Setting(self.site, self.options, self.frame, self.radar_frames)
+        if len(self.registration.met) < len(self.radars):
+            self.registration, said = self.registration.meeting(self.radars, self.options.registration)
+            at = self.now or (self.heard[0].now if self.heard else 0)
+            self.events += [Event(at, one.level, one.text) for one in said]
 
     def count(self, reason: str, by: int = 1) -> None:
         """One more for a reason."""
@@ -133,7 +139,7 @@ class Making:
             align=align.draw(self.fixes, self.plots, self.frame, self.radar_frames),
             track=track.table(self.tracks, self.untracked),
             associate=associate.table(self.checks, self.association.ledger, self.changes),
-            register=self.registration.table(self.radars),
+            register=register.table(self.registration, self.radars, self.now or 0, self.residuals),
             fuse=replace(table, settled=tuple(self.settled)),
             predict=predict.table(self.forecasts, self.frame),
             truth=tuple(observation for observation in observations if isinstance(observation, Truth)),

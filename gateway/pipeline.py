@@ -20,16 +20,17 @@ __all__ = ["State", "initial", "step"]
 def step(state: State, heard: Sequence[Heard], health: Health = Health()) -> tuple[State, Picture]:
     """What was heard, worked into the state; and the picture of what came of it.
 
-    Predictions are made at their instants, between the arrivals.
+    Register and predict have their instants, the whole seconds between the arrivals.
     """
     work = Work(state, heard)
     for arrival in heard:
-        work.predict_until(arrival)
+        for at in work.seconds_until(arrival):
+            work.register(at)
+            work.predict(at)
         if not work.takes(arrival):
             continue
         fixes, plots = work.align(arrival)
         tracked = work.track(plots)
         work.associate(fixes, tracked)
-        work.register()
         work.fuse(fixes, tracked)
     return work.picture(health)

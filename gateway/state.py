@@ -10,7 +10,7 @@ from gateway.associate import Association, Change
 from gateway.frames import RunwayFrame
 from gateway.fuse import Lanes
 from gateway.fuse.consistency import Consistency
-from gateway.register import Registration
+from gateway.register import Registration, Remembered
 from gateway.settings import Options, RadarSite, Site
 from gateway.track import RadarTracks
 
@@ -38,7 +38,11 @@ class State:
     consistency: Consistency = Consistency()  # whether sources scatter as much as the settings say
 
 
-def initial(site: Site, options: Options = Options()) -> State:
-    """The state before the first arrival."""
+def initial(
+    site: Site, options: Options = Options(), remembered: Remembered | None = None, age_s: float = 0.0
+) -> State:
+    """The state before the first arrival. `remembered`: what was learnt of the site's radars so long ago."""
     radars = {radar.number: radar for radar in site.radars}
-    return State(site, options, RunwayFrame(site.runway), radars, Geoid(site.runway.geoid_separation_m))
+    registration = Registration(remembered=remembered, age_s=age_s)
+    geoid = Geoid(site.runway.geoid_separation_m)
+    return State(site, options, RunwayFrame(site.runway), radars, geoid, registration=registration)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -10,11 +10,12 @@ from gateway import associate, fuse, predict, track
 from gateway.align import SECOND, Fix, Plot
 from gateway.arriving import Arriving
 from gateway.associate import Association
-from gateway.fuse import LifeChange
+from gateway.fuse import Lane, LifeChange
 from gateway.fuse.consistency import Finding
 from gateway.making import NAMED_AT_MOST
 from gateway.observation import Heard
 from gateway.picture import Event
+from gateway.register import WAIT_NS, gathered, residuals
 from gateway.track import Key, RadarTracks
 
 PLOT_MARGIN_S = 4.0  # plots are remembered this much longer than reports: a report's check looks back over them
@@ -25,10 +26,14 @@ Tracked = list[tuple[Plot, Key]]
 class Work(Arriving):
     """The stages of one step; lives only inside `pipeline.step`, which calls them in order for each arrival."""
 
-    # predict, and all else that happens by itself -----------------------------------------------------------------
+    # what happens by itself ---------------------------------------------------------------------------------------
 
-    def predict_until(self, arrival: Heard) -> None:
-        """Everything that happens by itself before an arrival; with a watermark also at its very instant."""
+    def seconds_until(self, arrival: Heard) -> Iterator[int]:
+        """The whole seconds before an arrival, with a watermark also at its very instant.
+
+        What else happens by itself is done on the way: checks that are due before them, in each of them ends and coasting, and
+        after what is made of it forgetting.
+        """
         now, watermark = arrival.now, not arrival.observations
         if self.now is None or now < self.now - self.history:
             self._start_again(now)
@@ -37,19 +42,20 @@ class Work(Arriving):
             self.now = max(at, self.now or at)
             self._check_due()
             if at == self.instant:
-                self._whole_second(at)
+                self._live_until(at)
+                yield at
+                self._forget(at)
                 idle = not self.lanes.lanes and self.association.due is None
                 self.instant = (max((now - 1) // SECOND * SECOND, at) if idle else at) + SECOND
             due = self._next_check()
         self.now = max(now, self.now or now)
         self.events += [Event(now, level, text) for level, text in arrival.notes]
 
-    def _whole_second(self, at: int) -> None:
-        """Ends, coasting, predictions, what scatters otherwise than stated, and forgetting what is older than the history."""
+    def _live_until(self, at: int) -> None:
+        """Ends, coasting, and what scatters otherwise than stated."""
         self._settle()
         self._join_radars(at)
-        judged = self.consistency.judged(self.site.position, self.radars, self.radar_frames, at)
-        self.consistency, findings = judged
+        self.consistency, findings = self.consistency.judged(self.site.position, self.radars, at)
         for found in findings:
             self._say_scatter(found)
         lanes, ended = fuse.end_silent(self.lanes, at, self.options)
@@ -58,13 +64,17 @@ class Work(Arriving):
         lanes, lived = fuse.told(lanes, at, self.options)
         self.lived += lived
         self.events += [Event(at, "info", text) for one in lived if (text := fuse.sentence(one, lanes)) is not None]
-        alive = [lane for lane in lanes.lanes.values() if lane.ended_at is None and lane.events]
-        silent = [lane for lane in alive if lane.coasting_at(at, self.options)]
+        self.lanes = lanes
+        silent = [lane for lane in self._alive() if lane.coasting_at(at, self.options)]
         self.rows += fuse.coast(silent, at, self._spans, self.geoid.separation_m, self.model)
-        if alive and at % int(self.options.prediction_period_s * SECOND) == 0:
-            self.forecasts.append(predict.forecast(alive, at, self.options.horizons_s, self.model))
+
+    def _alive(self) -> list[Lane]:
+        return [lane for lane in self.lanes.lanes.values() if lane.ended_at is None and lane.events]
+
+    def _forget(self, at: int) -> None:
+        """What is older than the history."""
         before = at - self.history
-        was, self.lanes = self.lanes, lanes.pruned(before)
+        was, self.lanes = self.lanes, self.lanes.pruned(before)
         self.settled += fuse.settled(was, self.lanes)
         self.tracks = self.tracks.pruned(before - int(PLOT_MARGIN_S * SECOND))
         self.lanes = fuse.remembered(self.lanes, self.tracks, self._spans)
@@ -74,7 +84,7 @@ class Work(Arriving):
                 self.events.append(
                     Event(at, "info", f"radar track {track.name_of(key)}, {aircraft}, has fallen silent")
                 )
-        self.association = associate.pruned(associate.forgotten(self.association, gone), before)
+        self.association = associate.pruned(associate.forgotten(self.association, gone), before - WAIT_NS)
         self.lanes, doubted = fuse.reviewed(self.lanes, self.association.ledger.spans, self.tracks, at)
         for one in doubted:
             text = f"radar track {track.name_of(one.key)} is {one.aircraft} no more: its reports do not find it there"
@@ -102,6 +112,7 @@ class Work(Arriving):
         self.settled += fuse.settled(was, self.lanes)
         self.ended += ended
         self.tracks, self.association = RadarTracks(), Association()
+        self.registration = self.registration.again(now)
         # An arrival stamped at a whole second comes before what happens at that second.
         self.now, self.instant = now, (now - 1) // SECOND * SECOND + SECOND
 
@@ -182,8 +193,27 @@ class Work(Arriving):
 
     # register -----------------------------------------------------------------------------------------------------
 
-    def register(self) -> None:
-        """Nothing is learnt while a session runs: what the site file says of a radar is what align takes off."""
+    def register(self, at: int) -> None:
+        """What pairs that leave the history tell of the radars' errors; a step further in what align takes off."""
+        use = self.options.registration
+        if use == "off":
+            return
+        until, known = at - self.history - WAIT_NS, self.registration.learnt_until
+        spans = self.association.ledger.spans
+        pairs = gathered(self.association, spans, self.tracks, self.radar_frames, known, until) if spans else None
+        found = self.registration.second(pairs, self.radars, self.site.position, use, at, self.history)
+        self.registration, said = replace(found[0], learnt_until=until), found[1]
+        self.events += [Event(at, one.level, one.text) for one in said]
+        if pairs is not None:
+            self.residuals.append(residuals(pairs, self.registration, self.radars))
+
+    # predict ------------------------------------------------------------------------------------------------------
+
+    def predict(self, at: int) -> None:
+        """Where every track will be."""
+        alive = self._alive()
+        if alive and at % int(self.options.prediction_period_s * SECOND) == 0:
+            self.forecasts.append(predict.forecast(alive, at, self.options.horizons_s, self.model))
 
     # fuse ---------------------------------------------------------------------------------------------------------
 

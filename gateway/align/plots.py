@@ -13,11 +13,12 @@ Correction = tuple[float, float, float, float]  # what is taken off: range m, az
 Polar = tuple[float, float, float]  # range m, azimuth rad, elevation rad; NaN = not measured
 
 SECOND = 1_000_000_000
+NOTHING: Correction = (0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plot:
-    """A radar plot, corrected: range m, azimuth rad, elevation rad, NaN = not measured."""
+    """A radar plot, corrected: range m, azimuth rad, elevation rad, NaN = not measured; and what was taken off it."""
 
     at: int
     serial: int
@@ -26,6 +27,21 @@ class Plot:
     number: int
     polar: Polar
     sigma: Polar
+    taken_off: Correction = NOTHING
+
+    @property
+    def said_at(self) -> int:
+        """The radar's own stamp."""
+        return self.at + round(self.taken_off[3] * SECOND)
+
+    @property
+    def said(self) -> Polar:
+        """What the radar measured, before anything was taken off."""
+        return (
+            self.polar[0] + self.taken_off[0],
+            self.polar[1] + self.taken_off[1],
+            self.polar[2] + self.taken_off[2],
+        )
 
 
 def place_plot(plot: RadarPlot, serial: int, radar: RadarSite, correction: Correction) -> Plot:
@@ -42,7 +58,7 @@ def place_plot(plot: RadarPlot, serial: int, radar: RadarSite, correction: Corre
     )
     polar = (distance, azimuth, elevation)
     at = plot.valid_at - round(late_s * SECOND)
-    return Plot(at, serial, plot.received_at, plot.radar, plot.track_number, polar, sigma)
+    return Plot(at, serial, plot.received_at, plot.radar, plot.track_number, polar, sigma, correction)
 
 
 def radar_from_status(status: RadarStatus, frame: RunwayFrame) -> RadarSite:

@@ -1,35 +1,26 @@
-"""Register: the systematic errors of radars, which the next align takes off.
+"""Register: the systematic errors of radars, learnt from pairs while a session runs, which the next align takes off.
 
-What the site file says of them is taken off; while a session runs nothing is learnt yet.
+`pairing` holds reports beside what radars measured of the same aircraft; `learning` is the stage's state, and what happens each
+second; `choosing` decides what is taken off and `corrections` steps towards it; `watching` notices a radar that was moved
+or repaired; `verdicts` says it in words; `remembered` is what one session hands to the next; `telling` makes the result.
+Source: 004.
 """
 
-from __future__ import annotations
+from gateway.register.learning import Registration
+from gateway.register.pairing import WAIT_NS, Gathered, gathered
+from gateway.register.registered import Registered, Residuals
+from gateway.register.remembered import Remembered, RememberedRadar
+from gateway.register.telling import residuals, table
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
-
-from gateway.align import Correction
-from gateway.register.registered import EACH, Registered, Residuals
-from gateway.settings import RadarSite
-
-Floats = NDArray[np.float64]
-
-__all__ = ["Registered", "Registration", "Residuals"]
-
-
-@dataclass(frozen=True, slots=True)
-class Registration:
-    """What is known of the radars' errors; used by the next align."""
-
-    def of(self, radar: RadarSite) -> Correction:
-        """What is taken off this radar's measurements."""
-        return radar.range_error_m, radar.azimuth_error_rad, radar.elevation_error_rad, radar.time_error_s
-
-    def table(self, radars: Mapping[int, RadarSite]) -> Registered:
-        """What is taken off, as columns."""
-        numbers = tuple(sorted(radars))
-        correction: Floats = np.array([self.of(radars[number]) for number in numbers]).reshape(-1, EACH)
-        return Registered.untold(numbers, correction)
+__all__ = [
+    "WAIT_NS",
+    "Gathered",
+    "Registered",
+    "Registration",
+    "Remembered",
+    "RememberedRadar",
+    "Residuals",
+    "gathered",
+    "residuals",
+    "table",
+]

@@ -30,6 +30,19 @@ class Residuals:
     after: Floats  # (k, 3)
 
     @classmethod
+    def of(cls, some: Sequence[Residuals]) -> Residuals:
+        """Those of several seconds together."""
+        if not some:
+            return cls.none()
+        return cls(
+            np.concatenate([one.time for one in some]),
+            np.concatenate([one.radar for one in some]),
+            tuple(name for one in some for name in one.aircraft),
+            np.concatenate([one.before for one in some]),
+            np.concatenate([one.after for one in some]),
+        )
+
+    @classmethod
     def none(cls) -> Residuals:
         """Nothing was learnt."""
         whole, real = np.zeros(0, np.int64), np.zeros((0, 3))
@@ -63,6 +76,6 @@ class Registered:
     @classmethod
     def untold(cls, radars: Sequence[int], correction: Floats) -> Registered:
         """Before anything was learnt: only what the site file has taken off."""
-        unknown = np.full((len(radars), EACH), math.nan)
-        nothing = np.zeros((len(radars), EACH), np.bool_)
-        return cls(tuple(radars), correction, unknown, unknown, nothing, (("", "", "", ""),) * len(radars))
+        shape = len(radars), EACH
+        unknown, words = np.full(shape, math.nan), (("", "", "", ""),) * len(radars)
+        return cls(tuple(radars), correction, unknown, unknown.copy(), np.zeros(shape, np.bool_), words)

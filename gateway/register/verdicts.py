@@ -59,3 +59,10 @@ class Verdict:
             off = per * (self.value - self.stated)
             return f"{self.name}: nothing significant{beyond} ({off:+.{digits}f} {sigma} {unit})"
         return f"{self.name}: {_CLAIMED[place].format(per * self.value)} ({sigma}): {use}"
+
+
+def in_words(verdict: Verdict, applied: bool) -> str:
+    """What is known of an error, and whether it is taken off at present."""
+    if applied and not verdict.is_told:
+        return f"{verdict.name}: applied as it was found before; at present the geometry does not tell it"
+    return verdict.sentence("applied" if applied or not verdict.is_found else "to be applied")

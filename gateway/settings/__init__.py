@@ -3,7 +3,7 @@
 A site file is TOML with the unit in every key's name; inside, everything is SI and radians.
 """
 
-from gateway.settings.options import AssociationRule, EstimatorName, Mute, Options, Weighting
+from gateway.settings.options import AssociationRule, EstimatorName, Mute, Options, Registering, Weighting
 from gateway.settings.reading import SiteError, parse_site
 from gateway.settings.site import (
     DEMO_SITE,
@@ -30,6 +30,7 @@ __all__ = [
     "Options",
     "PositionSource",
     "RadarSite",
+    "Registering",
     "Runway",
     "Site",
     "SiteError",

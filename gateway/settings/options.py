@@ -8,6 +8,7 @@ from typing import Literal
 Weighting = Literal["bias", "covariance", "innovation", "literal"]
 EstimatorName = Literal["kalman", "imm", "rmimm", "alpha-beta-gamma"]
 AssociationRule = Literal["default", "literal"]
+Registering = Literal["apply", "watch", "off"]
 MutedSource = Literal["gps", "radar"]
 
 
@@ -34,6 +35,7 @@ class Options:
     )
     weighting: Weighting = "bias"
     association: AssociationRule = "default"
+    registration: Registering = "apply"  # what radars measure too much: learnt and taken off, only told, or neither
     acceleration_sigma_mps2: float = 2.0  # of the constant-velocity model, east and north
     vertical_acceleration_sigma_mps2: float = 1.0  # aircraft change their climb less than their course
     acceleration_time_s: float = 0.4  # white over this time: sigma^2 x time is the density, whatever the step
