@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix, Plot
-from gateway.frames import RadarFrame
+from gateway.estimators.kalman import VELOCITY
 from gateway.fuse.events import Event, Measure
 from gateway.fuse.evidence import ENOUGH, PLOT, REPORT, Part, Sums, evidence
 from gateway.fuse.scatter import left_of_plots, left_of_reports, rows_of
@@ -29,6 +29,7 @@ Floats = NDArray[np.float64]
 SURE = 12.0  # evidence that is sure of a single noise; of many, the logarithm of their number more
 LASTING = 0.3  # a receiver whose reports scatter by less than this share of what is stated has errors that last
 TOGETHER_AT_LEAST, TOGETHER_ENOUGH = 3, 4.0 * ENOUGH  # aircraft, and squares of theirs, which are many soon
+MANY, WAIT_NS = 64, 5 * SECOND  # measurements that are judged at once, or all that came in so long
 KEPT_PLOTS, KEPT_REPORTS = 6, 3  # of each track and source, to hold the next ones against
 KEPT_NS = 30 * SECOND
 SOURCES_AT_MOST = 4096  # the least lately heard are forgotten
@@ -74,19 +75,20 @@ class Consistency:
         self,
         position: PositionSource,
         radars: Mapping[int, RadarSite],
-        frames: Mapping[int, RadarFrame],
         at: int = 0,
     ) -> tuple[Consistency, list[Finding]]:
-        """The same with what waited worked in, and what is sure by now of the sources that were just heard.
+        """At a whole second, the same with what waited worked in, and what is sure by now of the sources just heard.
 
-        Sources that were not heard for an hour before `at` are forgotten.
+        A few measurements wait for others: many cost hardly more. Sources that were not heard for an hour are forgotten.
         """
+        if len(self.waiting) < MANY and at % WAIT_NS:
+            return self, []
         groups, recent = self._grouped(at)
         told: dict[Key, Told] = {}
         for plots in (False, True):
             chosen = [group for key, group in groups.items() if (key[1] != 0) == plots]
             if chosen:
-                told |= _told(chosen, position, radars, frames)
+                told |= _told(chosen, position, radars)
         sums, heard = dict(self.sums), dict(self.heard)
         for key, one in told.items():
             sums[key] = sums.pop(key, Sums()).plus(one.added.tolist())
@@ -126,12 +128,12 @@ def _told(
     groups: Sequence[tuple[list[Event], int]],
     position: PositionSource,
     radars: Mapping[int, RadarSite],
-    frames: Mapping[int, RadarFrame],
 ) -> dict[Key, Told]:
     """What the new measurements of some groups of one kind, reports or plots, tell."""
     rows, events = rows_of(groups), [event for group, _ in groups for event in group]
     is_plot = isinstance(events[0].measure, Plot)
-    left = left_of_plots(rows, events, frames) if is_plot else left_of_reports(rows)
+    speed_mps = np.sqrt(np.square([event.mean[VELOCITY] for event in events]).sum(axis=1)) if is_plot else np.empty(0)
+    left = left_of_plots(rows, speed_mps) if is_plot else left_of_reports(rows)
     fresh = np.flatnonzero(rows.new)
     left, new = left.of(fresh), [events[row] for row in fresh.tolist()]
     stated = np.array([_stated(event.measure) for event in new])

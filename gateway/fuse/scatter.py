@@ -11,14 +11,13 @@ one would disturb it comes along. Manoeuvres only add: what is left over is neve
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix, Plot
-from gateway.frames import RadarFrame, polar_from_xyz
 from gateway.fuse.events import Event
 
 Floats = NDArray[np.float64]
@@ -78,37 +77,35 @@ def rows_of(groups: Sequence[tuple[Sequence[Event], int]]) -> Rows:
 def left_of_reports(rows: Rows) -> Left:
     """What is left over of reports' positions and velocities, k = 6."""
     left = _nothing(rows)
-    for component in range(6):
-        if component < 3:
-            _pairs(rows, component, left)
-        line, parabola = MANOEUVRE[component // 3], MANOEUVRE[component // 3 + 1]
-        for size, derivative, share in ((3, line, LINE), (4, parabola, PARABOLA)):
-            windows = _windows(rows, component, size)
-            value = rows.value[windows, component]
-            _differences(rows, component, windows, value, np.full(len(windows), derivative), share, left)
+    for known, components in _alike(rows, range(3)):
+        _pairs(rows, known, components, left)
+    for first in (0, 1):
+        for known, components in _alike(rows, range(3 * first, 3 * first + 3)):
+            _differences(rows, _windows(rows, known, 3), components, MANOEUVRE[first], LINE, left)
+            _differences(rows, _windows(rows, known, 4), components, MANOEUVRE[first + 1], PARABOLA, left)
     return left
 
 
-def left_of_plots(rows: Rows, events: Sequence[Event], frames: Mapping[int, RadarFrame]) -> Left:
-    """What is left over of plots, k = 3, beside straight flight as the track (`events`, one a row) now knows it."""
+def left_of_plots(rows: Rows, speed_mps: Floats) -> Left:
+    """What is left over of plots, k = 3, of targets that fly at speeds (n,): straight flight bends range and angles too."""
     left = _nothing(rows)
-    radar = np.array([event.measure.radar if isinstance(event.measure, Plot) else 0 for event in events])
-    mean = np.array([event.mean for event in events])
-    for number, frame in frames.items():
-        for component in range(3):
-            for size, derivative, share in ((3, MANOEUVRE[0], LINE), (4, MANOEUVRE[1], PARABOLA)):
-                windows = _windows(rows, component, size)
-                windows = windows[radar[windows[:, -1]] == number]
-                newest = windows[:, -1]
-                elapsed_s = rows.at_s[windows] - rows.at_s[newest][:, None]
-                flown = mean[newest, None, :3] + elapsed_s[:, :, None] * mean[newest, None, 3:6]
-                straight = polar_from_xyz(frame.from_enu(flown))
-                value = rows.value[windows, component] - straight[:, :, component]
-                if component == 1:
-                    value = value - 2.0 * math.pi * np.round(value / (2.0 * math.pi))
-                by = derivative / (1.0 if component == 0 else np.maximum(straight[:, -1, 0], 1.0))
-                _differences(rows, component, windows, value, np.broadcast_to(by, newest.shape), share, left)
+    distance_m = _last_known(rows)
+    bends = MANOEUVRE[0] + 2.0 * speed_mps**2 / distance_m
+    bends_more = MANOEUVRE[1] + 6.0 * speed_mps**3 / distance_m**2
+    for known, (component,) in _alike(rows, (0,), (1,), (2,)):
+        by = np.ones_like(distance_m) if component == 0 else 1.0 / distance_m
+        for size, derivative, share in ((3, bends * by, LINE), (4, bends_more * by, PARABOLA)):
+            windows = _windows(rows, known, size)
+            _differences(rows, windows, [component], derivative[windows[:, -1:]], share, left)
     return left
+
+
+def _last_known(rows: Rows) -> Floats:
+    """The distance (n,) of each plot's target when it was last measured; 1 m, at which anything may be, where it never was."""
+    distance = rows.value[:, 0]
+    place = np.maximum.accumulate(np.where(np.isnan(distance), 0, np.arange(len(distance))))
+    known = (rows.group[place] == rows.group) & (distance[place] > 1.0)
+    return np.where(known, distance[place], 1.0)
 
 
 def _nothing(rows: Rows) -> Left:
@@ -116,53 +113,67 @@ def _nothing(rows: Rows) -> Left:
     return Left(nowhere, np.full(rows.value.shape, math.inf), np.zeros(rows.value.shape))
 
 
-def _windows(rows: Rows, component: int, size: int) -> Ints:
-    """Rows (m, size) that follow each other in one group and have a component, the last of them new."""
-    known = np.flatnonzero(~np.isnan(rows.value[:, component]))
-    if len(known) < size:
-        return np.zeros((0, size), dtype=np.int64)
-    windows = np.lib.stride_tricks.sliding_window_view(known, size)
-    first, last = windows[:, 0], windows[:, -1]
-    return np.asarray(windows[(rows.group[first] == rows.group[last]) & rows.new[last]])
+def _alike(rows: Rows, *wholes: Sequence[int]) -> Iterator[tuple[Ints, list[int]]]:
+    """The rows in which components are known, and these: together where it is the same rows."""
+    known = ~np.isnan(rows.value)
+    for whole in wholes:
+        by_mask: dict[bytes, list[int]] = {}
+        for component in whole:
+            by_mask.setdefault(known[:, component].tobytes(), []).append(component)
+        for components in by_mask.values():
+            yield np.flatnonzero(known[:, components[0]]), components
+
+
+def _windows(rows: Rows, known: Ints, size: int) -> Ints:
+    """Rows (m, size) that follow each other among those known, in one group, the last of them new."""
+    count = max(len(known) - size + 1, 0)
+    windows = np.stack([known[start : start + count] for start in range(size)], axis=1)
+    return np.asarray(windows[(rows.group[windows[:, 0]] == rows.group[windows[:, -1]]) & rows.new[windows[:, -1]]])
 
 
 def _differences(
-    rows: Rows, component: int, windows: Ints, value: Floats, derivative: Floats, share: float, left: Left
+    rows: Rows, windows: Ints, components: Sequence[int], derivative: Floats | float, share: float, left: Left
 ) -> None:
-    """Divided differences of values (m, size) into `left`, where they are less disturbed than what is there.
+    """Divided differences in windows (m, size) into `left`, where they are less disturbed than what is there.
 
     The divided difference of s values is their (s-1)-th derivative somewhere between them, by (s-1)!.
     """
+    if not len(windows):
+        return
     size = windows.shape[1]
-    at_s, sigma = rows.at_s[windows], rows.sigma[windows, component]
+    at_s = rows.at_s[windows]
     apart = at_s[:, :, None] - at_s[:, None, :]
     apart[:, range(size), range(size)] = 1.0
-    weight = 1.0 / apart.prod(axis=2)
-    variance = (weight * weight * sigma * sigma).sum(axis=1)
-    disturbed = (derivative / math.factorial(size - 1)) ** 2 / variance
-    _take(left, windows[:, -1], component, (weight * value).sum(axis=1), variance, disturbed, share)
+    weight = (1.0 / apart.prod(axis=2))[:, :, None]
+    value, sigma = rows.value[windows][:, :, components], rows.sigma[windows][:, :, components]
+    if rows.value.shape[1] == 3 and components[0] == 1:  # azimuths turn over
+        value = value - 2.0 * math.pi * np.round((value - value[:, -1:]) / (2.0 * math.pi))
+    variance = np.square(weight * sigma).sum(axis=1)
+    disturbed = np.square(np.asarray(derivative) / math.factorial(size - 1)) / variance
+    _take(left, windows[:, -1], components, (weight * value).sum(axis=1), variance, disturbed, share)
 
 
-def _pairs(rows: Rows, component: int, left: Left) -> None:
+def _pairs(rows: Rows, known: Ints, components: Sequence[int], left: Left) -> None:
     """Reports less the ones before them, moved by the mean of both velocities, into `left`."""
-    windows = _windows(rows, component, 2)
-    before, after = windows[:, 0], windows[:, 1]
-    t = rows.at_s[after] - rows.at_s[before]
-    value, speed = rows.value[:, component], rows.value[:, component + 3]
-    off = value[after] - value[before] - 0.5 * t * (speed[before] + speed[after])
-    variance = (rows.sigma[windows, component] ** 2).sum(axis=1)
-    by_speed = 0.25 * t * t * (rows.sigma[windows, component + 3] ** 2).sum(axis=1)
-    disturbed = ((MANOEUVRE[1] * t * t * t / 12.0) ** 2 + by_speed) / variance
-    known = ~np.isnan(off)
-    _take(left, after[known], component, off[known], variance[known], disturbed[known], PAIR)
+    windows = _windows(rows, known, 2)
+    if not len(windows):
+        return
+    t = np.diff(rows.at_s[windows], axis=1)
+    faster = [component + 3 for component in components]
+    value, speed = rows.value[windows][:, :, components], rows.value[windows][:, :, faster]
+    off = value[:, 1] - value[:, 0] - 0.5 * t * speed.sum(axis=1)
+    variance = np.square(rows.sigma[windows][:, :, components]).sum(axis=1)
+    by_speed = 0.25 * t * t * np.square(rows.sigma[windows][:, :, faster]).sum(axis=1)
+    disturbed = np.where(np.isnan(off), math.inf, (np.square(MANOEUVRE[1] * t * t * t / 12.0) + by_speed) / variance)
+    _take(left, windows[:, -1], components, off, variance, disturbed, PAIR)
 
 
 def _take(
-    left: Left, rows: Ints, component: int, off: Floats, variance: Floats, disturbed: Floats, share: float
+    left: Left, rows: Ints, components: Sequence[int], off: Floats, variance: Floats, disturbed: Floats, share: float
 ) -> None:
-    there = left.disturbed[rows, component]
+    place = rows[:, None], np.array(components)
+    there = left.disturbed[place]
     better = (there > CALM) & (disturbed < there)
-    chosen = rows[better]
-    left.by_noise[chosen, component] = off[better] / np.sqrt(variance[better])
-    left.disturbed[chosen, component] = disturbed[better]
-    left.share[chosen, component] = share
+    left.by_noise[place] = np.where(better, off / np.sqrt(variance), left.by_noise[place])
+    left.share[place] = np.where(better, share, left.share[place])
+    left.disturbed[place] = np.where(better, disturbed, there)

@@ -38,7 +38,7 @@ def _judged(
     known, radars = Consistency(), {radar.number: radar for radar in world.site.radars}
     for second in range(told[0][1].at // SECOND, told[-1][1].at // SECOND + 1):
         known = known.hearing(one for one in told if one[1].at // SECOND == second)
-        known, new = known.judged(position, radars, world.radars, (second + 1) * SECOND)
+        known, new = known.judged(position, radars, (second + 1) * SECOND)
         for one in new:
             found.setdefault(one.topic, one)
     return known, found
@@ -93,8 +93,8 @@ def test_plots_of_right_noise_leave_over_squares_of_one_also_close_by(world: Any
         gone = "".join(letter for letter in "ae" if random.uniform() < 0.2)
         off = random.normal(0.0, (15.0, 1e-3, 1e-3))
         plots.append(world.plot(course, 0.1 * k, serial=k, off=off, missing=gone))
-    rows = rows_of([(events := _events(world, plots), 0)])
-    left = left_of_plots(rows, events, world.radars)
+    rows = rows_of([(_events(world, plots), 0)])
+    left = left_of_plots(rows, np.full(400, 120.0))
     for component in range(3):
         kept = left.by_noise[20:, component]
         assert np.nanmean(kept**2) == pytest.approx(1.0, abs=0.2)
@@ -202,7 +202,7 @@ def test_aircraft_are_judged_together(world: Any) -> None:
 def test_sources_are_bounded(world: Any) -> None:
     """Those least lately heard are forgotten."""
     known = {(f"GPS of {name}", "position", True): Sums() for name in range(SOURCES_AT_MOST + 10)}
-    kept, _ = Consistency(known).judged(PositionSource(), {}, {})
+    kept, _ = Consistency(known).judged(PositionSource(), {})
     assert len(kept.sums) == SOURCES_AT_MOST
     assert ("GPS of 0", "position", True) not in kept.sums
 
@@ -211,15 +211,15 @@ def test_what_is_kept_of_a_track_is_bounded_and_forgotten(world: Any) -> None:
     """A few measurements each, for half a minute after the last."""
     known, _ = _judged(world, [_reports(world, 20.0)])
     assert [len(kept) for kept in known.recent.values()] == [3]
-    later, _ = known.judged(PositionSource(), {}, {}, world.at(60.0))
+    later, _ = known.judged(PositionSource(), {}, world.at(60.0))
     assert not later.recent
 
 
 def test_late_reports_tell_nothing(world: Any) -> None:
     """A report that comes after later ones adds nothing to any sum, and changes nothing of what is kept."""
     events = _events(world, _reports(world, 20.0))
-    known, _ = Consistency().hearing((1, event) for event in events[:10]).judged(PositionSource(), {}, world.radars, 0)
-    late, _ = known.hearing([(1, events[4])]).judged(PositionSource(), {}, world.radars, 0)
+    known, _ = Consistency().hearing((1, event) for event in events[:10]).judged(PositionSource(), {}, 0)
+    late, _ = known.hearing([(1, events[4])]).judged(PositionSource(), {}, 0)
     assert late.sums == known.sums
     assert late.recent == known.recent
 
@@ -285,6 +285,8 @@ def test_sources_that_are_gone_for_an_hour_are_forgotten() -> None:
     """What is known of a source stays while it is heard, and an hour longer."""
     known = {(f"GPS of {name}", "position", True): Sums() for name in "ab"}
     hour = 3_600_000_000_000
-    kept, _ = Consistency(known, heard={"GPS of a": 0, "GPS of b": hour}).judged(PositionSource(), {}, {}, hour + 1)
+    kept, _ = Consistency(known, heard={"GPS of a": 0, "GPS of b": hour}).judged(
+        PositionSource(), {}, hour + 5 * SECOND
+    )
     assert list(kept.sums) == [("GPS of b", "position", True)]
     assert list(kept.heard) == ["GPS of b"]
