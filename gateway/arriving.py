@@ -7,12 +7,13 @@ from collections.abc import Iterator, Sequence
 from gateway import align
 from gateway.align import Fix, Geoid, Plot
 from gateway.making import NAMED_AT_MOST, Making
-from gateway.observation import GpsReport, Heard, RadarPlot, RadarStatus, Timing
+from gateway.observation import AirData, FlightPlan, GpsReport, Heard, Intent, RadarPlot, RadarStatus, Timing
 from gateway.state import State
 
 CONTRADICTION_M = 5.0  # between the site's and the streams' geoid: beyond this it is said
 AIRCRAFT_AT_MOST, RADARS_AT_MOST = 10_000, 64  # a bound on what strangers can make us remember
 STAGED = (GpsReport, RadarPlot, RadarStatus)
+FORETELLING = (FlightPlan, Intent, AirData)  # they tell predict where an aircraft is going, and the wind
 
 
 class Arriving(Making):
@@ -23,10 +24,15 @@ class Arriving(Making):
         self._placed = self._place(heard)
 
     def takes(self, arrival: Heard) -> bool:
-        """Whether a stage reads any of it; attitudes, inertial samples, air and intents pass by, for the sinks."""
+        """Whether a stage before predict reads any of it; attitudes and inertial samples pass by, for the sinks."""
+        staged = False
         for observation in arrival.observations:
             if isinstance(observation, STAGED):
-                return True
+                staged = True
+            elif isinstance(observation, FORETELLING):
+                self.predicting = self.predicting.hearing(observation)
+        if staged:
+            return True
         self.serial += len(arrival.observations)
         return False
 

@@ -32,7 +32,7 @@ class Making:
         self.association, self.registration, self.lanes = state.association, state.registration, state.lanes
         self.now, self.instant, self.serial = state.now, state.instant, state.serial
         self.counters, self.said, self.reported = dict(state.counters), state.said, state.reported
-        self.consistency = state.consistency
+        self.consistency, self.predicting = state.consistency, state.predicting
         self.history = int(state.options.history_s * SECOND)
         self.wait = int(state.options.association_wait_s * SECOND)
         self.events: list[Event] = []
@@ -128,6 +128,7 @@ class Making:
             self.said,
             self.reported,
             self.consistency,
+            self.predicting,
         )
         observations = tuple(observation for arrival in self.heard for observation in arrival.observations)
         own = SourceHealth("gateway", "pipeline", 0.0, 0.0, 0, tuple(sorted(self.counters.items())))

@@ -10,6 +10,7 @@ from gateway.associate import Association, Change
 from gateway.frames import RunwayFrame
 from gateway.fuse import Lanes
 from gateway.fuse.consistency import Consistency
+from gateway.predict import Predicting
 from gateway.register import Registration, Remembered
 from gateway.settings import Options, RadarSite, Site
 from gateway.track import RadarTracks
@@ -36,13 +37,21 @@ class State:
     said: frozenset[str] = frozenset()  # what is said once
     reported: frozenset[Change] = frozenset()  # pairs made and lost, lately
     consistency: Consistency = Consistency()  # whether sources scatter as much as the settings say
+    predicting: Predicting = Predicting()  # what aircraft say of their plans, and what is thought of each
+
+    def to_remember(self, at: int) -> Remembered | None:
+        """What is known of the radars' errors, for the next session of this site; None where nothing is."""
+        runway = self.site.runway
+        where = runway.latitude_rad, runway.longitude_rad, runway.landing_compass_rad
+        return self.registration.to_remember(self.radars, at, where)
 
 
 def initial(
-    site: Site, options: Options = Options(), remembered: Remembered | None = None, age_s: float = 0.0
+    site: Site, options: Options = Options(), remembered: Remembered | None = None, began: int = 0
 ) -> State:
-    """The state before the first arrival. `remembered`: what was learnt of the site's radars so long ago."""
+    """The state before the first arrival. `remembered`: of the site's radars, older by now, `began`, ns since 1970 UTC."""
     radars = {radar.number: radar for radar in site.radars}
+    age_s = 0.0 if remembered is None else remembered.age_s(began)
     registration = Registration(remembered=remembered, age_s=age_s)
     geoid = Geoid(site.runway.geoid_separation_m)
     return State(site, options, RunwayFrame(site.runway), radars, geoid, registration=registration)

@@ -76,6 +76,7 @@ class Work(Arriving):
         before = at - self.history
         was, self.lanes = self.lanes, self.lanes.pruned(before)
         self.settled += fuse.settled(was, self.lanes)
+        self.predicting = self.predicting.forgotten(self.lanes.lanes, self.lanes.by_aircraft, at)
         self.tracks = self.tracks.pruned(before - int(PLOT_MARGIN_S * SECOND))
         self.lanes = fuse.remembered(self.lanes, self.tracks, self._spans)
         gone = associate.missing(self.association, self.tracks)
@@ -213,7 +214,17 @@ class Work(Arriving):
         """Where every track will be."""
         alive = self._alive()
         if alive and at % int(self.options.prediction_period_s * SECOND) == 0:
-            self.forecasts.append(predict.forecast(alive, at, self.options.horizons_s, self.model))
+            self.predicting, made = predict.forecast(
+                self.predicting,
+                alive,
+                at,
+                self.options.horizons_s,
+                self.model,
+                self.site,
+                self.frame,
+                self.geoid.separation_m,
+            )
+            self.forecasts.append(made)
 
     # fuse ---------------------------------------------------------------------------------------------------------
 

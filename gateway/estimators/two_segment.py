@@ -135,7 +135,7 @@ def ahead(
     rule: Rule = "default",
     wind: Floats | None = None,
 ) -> Ahead:
-    """The paths of n aircraft along their routes (n, p, 2) at horizons (h,); past the last point straight on.
+    """The paths of n aircraft along their routes (n, p, 2) at horizons (h,) or (n, h); past the last point straight on.
 
     `turning_rps` (n,) is how fast they turn where they do not turn yet; `wind` (n, 2) where the air moves to, m/s, 0 where it
     is not known. Who cannot come to point at the route is carried on in its present turn, and does not follow.
@@ -143,7 +143,7 @@ def ahead(
     n = len(now.position)
     speed = np.sqrt(now.velocity[:, 0] * now.velocity[:, 0] + now.velocity[:, 1] * now.velocity[:, 1])
     course = np.arctan2(now.velocity[:, 1], now.velocity[:, 0])
-    path = _Path.at_start(now.position, course, np.broadcast_to(horizons_s, (n, len(horizons_s))))
+    path = _Path.at_start(now.position, course, np.broadcast_to(horizons_s, (n, np.shape(horizons_s)[-1])))
     if rule == "literal":
         route, wind = route[:, :1], None
     following = _following(route)

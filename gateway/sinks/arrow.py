@@ -65,6 +65,9 @@ PREDICTIONS = pa.schema(
         ("intent", _TEXT),
         ("intent_kind", _TEXT),
         ("confidence", _REAL),
+        ("sigma_along_m", _REAL),
+        ("sigma_across_m", _REAL),
+        ("course_deg", _REAL),
     ]
 )
 
@@ -129,6 +132,9 @@ def predictions_batch(parts: Sequence[Predicted]) -> pa.RecordBatch:
         _real(np.concatenate([part.sigma_m for part in parts])),
         *(_text([getattr(part, name) for part in parts]) for name in ("method", "intent", "intent_kind")),
         _real(np.concatenate([part.confidence for part in parts])),
+        _real(np.concatenate([part.sigma_along_m for part in parts])),
+        _real(np.concatenate([part.sigma_across_m for part in parts])),
+        _real(np.degrees(np.concatenate([part.course_rad for part in parts]))),
     ]
     return pa.RecordBatch.from_arrays(columns, schema=PREDICTIONS)
 

@@ -69,7 +69,7 @@ def test_without_modes_there_are_no_probabilities(world: Any) -> None:
 
 
 def test_a_look_ahead_goes_on_turning(world: Any) -> None:
-    """In a turn the point in 10 s lies on the circle; constant velocity leaves it by 300 m."""
+    """In a turn the point in 10 s lies on the circle, whether modes tell of it or the course; straight on is off by 300 m."""
     rate, options = math.radians(3.0), Options(horizons_s=(10.0,))
     reports = _circling(world, rate, 60, 120.0)
     ran = [world.run(reports[:41], options=replace(options, estimator=name)) for name in ("rmimm", "kalman")]
@@ -81,8 +81,7 @@ def test_a_look_ahead_goes_on_turning(world: Any) -> None:
         last = np.flatnonzero(predicted.valid == world.at(50.0))[-1]
         ahead = world.frame.enu_from_geodetic(predicted.latitude_rad[last], predicted.longitude_rad[last], 0.0)
         off.append(math.hypot(ahead[0] - east, ahead[1] - north))
-    assert off[0] < 40.0
-    assert off[1] > 250.0
+    assert max(off) < 40.0
 
 
 def test_coasting_goes_through_the_modes(world: Any) -> None:

@@ -1,0 +1,141 @@
+"""Goals: the points that one aircraft may be going to, as arrays that forecasts of many aircraft are stacked of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.frames import RunwayFrame, turn
+from gateway.observation import FlightPlan, Intent, PlanPoint
+from gateway.predict.told import Told
+from gateway.settings import Site
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+COUNT = (
+    20  # places for candidates; always as many, so that sums over them have the same bits for one aircraft and for many
+)
+LEGS = 4  # points of a route: the candidate and what the plan has after it
+PLANNED = range(0, 10)
+DECLARED, HOME = 10, 11
+PUBLISHED = range(12, 16)
+RUNWAY, GO_AROUND = 16, 17
+AROUND = range(18, 20)  # beside weather that lies across the way
+SAME_PLACE_RAD = 1e-6
+GO_AROUND_M = 5000.0  # beyond the runway's far end
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Goals:
+    """Candidates of one aircraft: route (20, 4, 2) east and north, up (20, 4), NaN = none; the first of each is the candidate."""
+
+    route: Floats
+    up: Floats
+    names: tuple[str | None, ...]
+    planned: Bools  # (20,)
+    lands: Bools  # (20, 4)
+    circles: Bools  # (20,) a point to be flown round, not over
+    declared: int = -1  # which one it is said to go to
+    declared_at: int = 0
+
+
+def goals_of(told: Told | None, site: Site, frame: RunwayFrame, separation_m: float) -> Goals:
+    """What is known of one aircraft's goals; `separation_m` lifts altitudes above mean sea level."""
+    route, up = np.full((COUNT, LEGS, 2), math.nan), np.full((COUNT, LEGS), math.nan)
+    names: list[str | None] = [None] * COUNT
+    planned, circles = np.zeros(COUNT, dtype=np.bool_), np.zeros(COUNT, dtype=np.bool_)
+    lands = np.zeros((COUNT, LEGS), dtype=np.bool_)
+    for slot, (name, enu) in zip((RUNWAY, GO_AROUND), _runway_goals(site, frame), strict=True):
+        route[slot, 0], up[slot, 0], names[slot], lands[slot, 0] = enu[:2], enu[2], name, slot == RUNWAY
+    for slot, waypoint in zip(PUBLISHED, site.waypoints, strict=False):
+        route[slot, 0] = frame.enu_from_geodetic(waypoint.latitude_rad, waypoint.longitude_rad, site.runway.height_m)[
+            :2
+        ]
+        names[slot] = waypoint.name
+    if told is None:
+        return Goals(route, up, tuple(names), planned, lands, circles)
+    declared, points, home_m = told.declared, _points(told.plan), _home_m(told.plan)
+    if declared is not None and declared.sequence is not None:
+        points = [point for point in points if point.sequence >= declared.sequence]
+    places = [_place(point, home_m, separation_m, site, frame) for point in points[: len(PLANNED) + LEGS]]
+    for slot in PLANNED:
+        following = places[slot : slot + LEGS]
+        if not following:
+            break
+        route[slot, : len(following)] = [enu[:2] for enu in following]
+        up[slot, : len(following)] = [enu[2] for enu in following]
+        lands[slot, : len(following)] = [point.kind == "landing" for point in points[slot : slot + LEGS]]
+        names[slot], planned[slot] = f"{points[slot].kind} {points[slot].sequence}", True
+        circles[slot] = points[slot].kind == "loiter"
+    if told.plan is not None and told.plan.points and told.plan.points[0].kind == "home":
+        enu = _place(told.plan.points[0], home_m, separation_m, site, frame)
+        route[HOME, 0], names[HOME] = enu[:2], "home"
+    chosen = _declared(declared, points)
+    if chosen == DECLARED and declared is not None and declared.latitude_rad is not None:
+        route[DECLARED, 0], up[DECLARED, 0] = _declared_place(declared, separation_m, site, frame)
+        names[DECLARED] = "next waypoint" if declared.sequence is None else f"item {declared.sequence}"
+    since = declared.valid_at if declared is not None else 0
+    return Goals(route, up, tuple(names), planned, lands, circles, chosen, since)
+
+
+def _points(plan: FlightPlan | None) -> list[PlanPoint]:
+    return [point for point in plan.points if point.kind != "home"] if plan is not None else []
+
+
+def _home_m(plan: FlightPlan | None) -> float | None:
+    """Home's altitude above mean sea level."""
+    homes = [point for point in plan.points if point.kind == "home"] if plan is not None else []
+    return homes[0].altitude_msl_m if homes else None
+
+
+def _place(point: PlanPoint, home_m: float | None, separation_m: float, site: Site, frame: RunwayFrame) -> Floats:
+    """East, north, up (3,) of a plan's point; up is NaN where its height is not known."""
+    altitude = point.altitude_msl_m
+    if altitude is None and point.altitude_above_home_m is not None and home_m is not None:
+        altitude = home_m + point.altitude_above_home_m
+    return _enu(
+        point.latitude_rad, point.longitude_rad, None if altitude is None else altitude + separation_m, site, frame
+    )
+
+
+def _enu(latitude: float, longitude: float, height_m: float | None, site: Site, frame: RunwayFrame) -> Floats:
+    there = frame.enu_from_geodetic(latitude, longitude, site.runway.height_m if height_m is None else height_m)
+    return there if height_m is not None else np.array([there[0], there[1], math.nan])
+
+
+def _declared(declared: Intent | None, points: Sequence[PlanPoint]) -> int:
+    """Which candidate a declared intent is: the plan's first point, since the plan begins there, or the declared place."""
+    if declared is None:
+        return -1
+    if declared.latitude_rad is None or declared.longitude_rad is None:
+        return PLANNED[0] if points else -1
+    if declared.sequence is not None and points:
+        off_rad = abs(declared.latitude_rad - points[0].latitude_rad) + abs(
+            declared.longitude_rad - points[0].longitude_rad
+        )
+        if off_rad < SAME_PLACE_RAD:
+            return PLANNED[0]
+    return DECLARED
+
+
+def _declared_place(declared: Intent, separation_m: float, site: Site, frame: RunwayFrame) -> tuple[Floats, float]:
+    height = declared.height_m
+    if height is None and declared.altitude_msl_m is not None:
+        height = declared.altitude_msl_m + separation_m
+    there = _enu(declared.latitude_rad or 0.0, declared.longitude_rad or 0.0, height, site, frame)
+    return there[:2], float(there[2])
+
+
+def _runway_goals(site: Site, frame: RunwayFrame) -> tuple[tuple[str, Floats], tuple[str, Floats]]:
+    """Where the glide path meets the runway, and where a go-around leads: on, beyond the runway's far end."""
+    runway = site.runway
+    beyond = 0.5 * runway.length_m + GO_AROUND_M
+    aim = turn(frame.enu_from_runway, [runway.aiming_point_x_m, 0.0, 0.0])
+    over = turn(frame.enu_from_runway, [beyond, 0.0, 0.0])
+    over[2] = math.nan
+    return ("runway", aim), ("go-around", over)

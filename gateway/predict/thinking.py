@@ -1,0 +1,133 @@
+"""How each aircraft moves now, to which candidate it goes, and whether it goes where it said: one round for many tracks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.estimators import intent
+from gateway.estimators.intent import Belief, Inference, wrapped
+from gateway.predict.minds import UNKNOWN, Minds
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+SECOND = 1_000_000_000
+INFERENCE = Inference()
+LEAST_SPEED_MPS = 3.0  # slower, a course says nothing
+STALE_S = 10.0  # after a gap as long as this the course begins anew
+RATE_MEMORY_S = 1.5  # of the turn rate that is measured from the course
+LEAST_RATE_RPS = math.radians(0.75)  # a slower turn is none
+SURE_SIGMAS = 3.0
+
+REACTS_S = 6.0  # after a new goal was declared the aircraft has this long to begin to turn
+TOLERATED_RAD = math.radians(10.0)  # sigma of a follower's course about the way to its goal
+WANDERS = 0.15  # likelihood of a course against a follower's best, if it does not go there
+STOPS, RESUMES = 0.005, 0.01  # a second, of following
+TRUSTED_AT_FIRST, TRUSTED_AGAIN = 0.8, 0.6  # where a goal is declared, and where another one is after a doubted one
+NEAR_RADII = 2.5  # so many turn radii from its goal a course says nothing: it may be turning to the next one
+
+
+@dataclass(frozen=True, slots=True)
+class Motions:
+    """n aircraft as they move: position (n, 2), velocity (n, 2), speed, course, side of the turn, turn rate (n,)."""
+
+    position: Floats
+    velocity: Floats
+    speed: Floats
+    course: Floats
+    side: Ints  # 1 left, -1 right, 0 where no turn is sure
+    turn_rate: Floats  # of the turn, 0 where there is none
+    turning: Floats  # how fast it turns when it does, rad/s
+
+
+@dataclass(frozen=True, slots=True)
+class Thought:
+    """What is believed of n aircraft: by inference, and of the declared goal."""
+
+    belief: Belief
+    off: Floats  # (n, 20) angles to the candidates
+    follows: Floats  # (n,) trust in the declared goal, NaN = none declared
+
+
+def motions(
+    before: Minds,
+    at: int,
+    position: Floats,
+    velocity: Floats,
+    velocity_sigma: Floats,
+    sides: Floats,
+    usual_rate: Floats,
+) -> tuple[Motions, Floats, Floats]:
+    """How n aircraft move now; and, to be remembered, their last two courses (n, 2) and the time between these.
+
+    `sides` (n, 3) are the modes' probabilities of straight, left, right, NaN = no modes; `usual_rate` (n,) how fast one turns
+    at this speed. The turn rate is what the course has changed by, weighed against the usual one by how well it is known.
+    """
+    speed = np.sqrt(velocity[:, 0] * velocity[:, 0] + velocity[:, 1] * velocity[:, 1])
+    course = np.arctan2(velocity[:, 1], velocity[:, 0])
+    elapsed_s = np.where(before.at == UNKNOWN, math.inf, (at - before.at) / SECOND)
+    fresh = (elapsed_s > STALE_S) | (elapsed_s <= 0.0)
+    older = np.where(np.isnan(before.courses[:, 1]), before.courses[:, 0], before.courses[:, 1])
+    span_s = np.where(np.isnan(before.courses[:, 1]), elapsed_s, elapsed_s + before.interval_s)
+    measured = np.where(fresh, 0.0, wrapped(course - older) / np.where(fresh, 1.0, span_s))
+    measured = np.where(speed < LEAST_SPEED_MPS, 0.0, measured)
+    sigma = math.sqrt(2.0) * velocity_sigma / np.maximum(speed, LEAST_SPEED_MPS) / np.where(fresh, 1.0, span_s)
+    by_modes = np.where(np.isnan(sides[:, 0]), 0, np.array([0, 1, -1])[np.nan_to_num(sides).argmax(axis=1)])
+    by_modes = np.where(np.nan_to_num(sides).max(axis=1) > intent.TURN_SURE, by_modes, 0)
+    by_course = np.where(np.abs(measured) > np.maximum(SURE_SIGMAS * sigma, LEAST_RATE_RPS), np.sign(measured), 0.0)
+    side = np.where(np.isnan(sides[:, 0]), by_course, by_modes).astype(np.int64)
+    usual_sigma = 0.5 * usual_rate
+    known, assumed = 1.0 / np.maximum(sigma, 1e-4) ** 2, 1.0 / usual_sigma**2
+    agrees = measured * side > 0.0
+    rate = np.where(agrees, (measured * known + side * usual_rate * assumed) / (known + assumed), side * usual_rate)
+    courses = np.stack([course, np.where(fresh, math.nan, before.courses[:, 0])], axis=1)
+    now = Motions(position, velocity, speed, course, side, np.where(side == 0, 0.0, rate), usual_rate)
+    return now, courses, np.where(fresh, 0.0, elapsed_s)
+
+
+def inferred(
+    before: Minds, at: int, now: Motions, places: Floats, planned: Bools, lowered: Floats
+) -> tuple[intent.Seen, Belief, Floats]:
+    """To which of its candidates (n, 20, 2) each aircraft goes; `lowered` (n, 20) are factors on their weights."""
+    elapsed_s = np.where(before.at == UNKNOWN, 1.0, np.maximum((at - before.at) / SECOND, 0.0))
+    off = intent.off_course(now.position, now.velocity, places)
+    seen, by_course = intent.seen(before.seen, off, now.side, elapsed_s, INFERENCE)
+    time_s = intent.time_to_go(now.position, now.velocity, places)
+    weight = by_course * intent.by_time(time_s, planned, INFERENCE) * lowered
+    weight = np.where((now.speed < LEAST_SPEED_MPS)[:, None], math.nan, weight)
+    return seen, intent.believed(weight, off, INFERENCE), off
+
+
+def trusted(before: Minds, at: int, now: Motions, goal: Floats, circles: Bools, since: Ints) -> Floats:
+    """How far it is to be believed (n,) that each aircraft goes to its declared goal (n, 2), said `since`; NaN = none.
+
+    A hidden Markov model of two states, following and not: who follows flies at the goal or turns towards it.
+    """
+    said = ~np.isnan(goal[:, 0])
+    off = intent.off_course(now.position, now.velocity, goal[:, None])[:, 0]
+    way = goal - now.position
+    distance = np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1])
+    radius = now.speed / now.turning
+    another = said & (since != before.declared_at)
+    start = np.where(before.declared_at == UNKNOWN, TRUSTED_AT_FIRST, np.maximum(before.trust, TRUSTED_AGAIN))
+    trust = np.where(another, start, before.trust)
+    elapsed_s = np.where(before.at == UNKNOWN, 1.0, np.clip((at - before.at) / SECOND, 0.0, STALE_S))
+    toward = (now.side != 0) & (intent.to_turn(np.nan_to_num(off)[:, None], now.side)[:, 0] < math.pi)
+    away = (now.side != 0) & ~toward
+    fits = np.exp(-0.5 * (np.nan_to_num(off) / TOLERATED_RAD) ** 2)
+    likelihood = np.where(toward, np.maximum(fits, 0.5), np.where(away, 0.05, np.maximum(fits, 0.02)))
+    likelihood = np.where(
+        circles & (distance < 2.0 * NEAR_RADII * radius), np.where(now.side != 0, 0.5, WANDERS), likelihood
+    )
+    silent = ~circles & ((distance < NEAR_RADII * radius) | ((at - since) / SECOND < REACTS_S)) | (
+        now.speed < LEAST_SPEED_MPS
+    )
+    weight = np.where(silent, 1.0, (likelihood / WANDERS) ** elapsed_s)
+    after = trust * weight / (trust * weight + 1.0 - trust)
+    after = after + elapsed_s * (RESUMES * (1.0 - after) - STOPS * after)
+    return np.where(said, np.clip(after, 0.01, 0.99), math.nan)
