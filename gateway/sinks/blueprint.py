@@ -9,6 +9,7 @@ import rerun.blueprint as rrb
 from gateway.settings import Site
 from gateway.sinks.scene import style
 from gateway.sinks.scene.health import SOURCES, VEHICLES, unit_part
+from gateway.sinks.scene.register import VERDICT
 from gateway.sinks.scene.scope import Scope
 from gateway.sinks.scene.site import approach_reach_m
 
@@ -21,7 +22,7 @@ _RECENT = rrb.TimeRange(  # an approach lasts this long; left alone the viewer s
 def blueprint(site: Site, *, modes: bool = False) -> rrb.Blueprint:
     """The views of a session at this site; one of the mode probabilities only where the estimator has `modes`."""
     return rrb.Blueprint(
-        rrb.Tabs(_picture_page(site, modes), _health_page(), active_tab=0),
+        rrb.Tabs(_picture_page(site, modes), _registration_page(site), _health_page(), active_tab=0),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         rrb.TimePanel(state="collapsed", timeline="utc", play_state="following"),
@@ -53,7 +54,7 @@ def _picture_page(site: Site, modes: bool) -> rrb.Horizontal:
                 _plot(f"Distance to threshold, {units.distance}", ["/approach/distance/**"]),
             ),
             rrb.Tabs(
-                _plot(f"Biases, {units.length}", ["/register/gps/**", "/register/radar/**"]),
+                _plot(f"Biases, {units.length}", ["/register/gps/**", "/register/error/range/**"]),
                 *([_plot("Modes", ["/fuse/modes/**"])] if modes else []),
                 _plot(f"Speed, {units.speed}", ["/fuse/**", "- /fuse/modes/**", "- /fuse/sigma/**"]),
                 _plot(f"Sigma, {units.length}", ["/fuse/sigma/**"]),
@@ -64,6 +65,30 @@ def _picture_page(site: Site, modes: bool) -> rrb.Horizontal:
         ),
         column_shares=[5, 3],
         name="Picture",
+    )
+
+
+def _registration_page(site: Site) -> rrb.Horizontal:
+    """What is systematically wrong: in words, over time with its sigma and what is taken off, and what is left of it."""
+    length = style.units_of(site).length
+    units = {"range": length, "azimuth": "degrees", "elevation": "degrees", "time": "ms"}
+    errors = [
+        _plot(f"{what.capitalize()} error, {unit}", [f"/register/error/{what}/**"], has_legend=what == "range")
+        for what, unit in units.items()
+    ]
+    residuals = [
+        _plot(
+            f"{what.capitalize()}, {unit}: radar less report", [f"/register/residual/{what}/**"], has_legend=not place
+        )
+        for place, (what, unit) in enumerate([*units.items()][:3])
+    ]
+    sources = _plot(f"Errors of position sources, {length}", ["/register/gps/**"], has_legend=False)
+    return rrb.Horizontal(
+        rrb.TextDocumentView(origin=VERDICT, name="Registration"),
+        rrb.Vertical(*errors),
+        rrb.Vertical(*residuals, sources),
+        column_shares=[4, 5, 5],
+        name="Registration",
     )
 
 
@@ -149,11 +174,13 @@ def _log() -> rrb.TextLogView:
     return rrb.TextLogView(origin="/log", name="Log", columns=columns)
 
 
-def _plot(name: str, contents: list[str], legend: rrb.Corner2D = rrb.Corner2D.LeftBottom) -> rrb.TimeSeriesView:
+def _plot(
+    name: str, contents: list[str], legend: rrb.Corner2D = rrb.Corner2D.LeftBottom, *, has_legend: bool = True
+) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         origin="/",
         name=name,
         contents=contents,
         axis_x=rrb.TimeAxis(view_range=_RECENT),
-        plot_legend=rrb.PlotLegend(legend),
+        plot_legend=rrb.PlotLegend(legend, visible=has_legend),
     )

@@ -20,6 +20,7 @@ from gateway.sinks.scene.flown import Flights
 from gateway.sinks.scene.health import HealthScene
 from gateway.sinks.scene.paths import ApproachScene, PredictScene
 from gateway.sinks.scene.plans import PlanScene
+from gateway.sinks.scene.register import RegisterScene
 from gateway.sinks.scene.scope import ScopeScene
 from gateway.sinks.scene.site import SiteScene
 from gateway.sinks.scene.smoothed import SmoothedScene
@@ -69,7 +70,7 @@ class RerunSink:
         self._flights, self._sources, self._tracks = Flights(site), SourceScene(site), TrackScene(site)
         self._approach, self._predict, self._stages = ApproachScene(site), PredictScene(site), StageScene(site)
         self._scope, self._health, self._plans = ScopeScene(site), HealthScene(), PlanScene(site)
-        self._smoothed = SmoothedScene(site)
+        self._smoothed, self._register = SmoothedScene(site), RegisterScene(site)
         self._period_ns, self._rows_limit = round(period_s * 1e9), rows_limit
         self._rest_ns = self._period_ns
         self._waiting: list[Picture] = []
@@ -145,6 +146,7 @@ class RerunSink:
             *self._approach.entries(flights),
             *self._predict.entries(pictures, flights),
             *self._stages.entries(pictures, flights, self._flights.newest),
+            *self._register.entries(pictures),
             *self._health.entries(pictures),
             *self._plans.entries(pictures, flights),
         ]

@@ -1,8 +1,7 @@
-"""The other stages: /track, /associate, /register, /log, and the end of tracks."""
+"""The other stages: /track, /associate, /log, and the end of tracks."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -89,19 +88,11 @@ class StageScene:
         return entries
 
     def _sample(self, picture: Picture) -> list[Sample]:
-        """Counts and corrections at this instant."""
+        """Counts at this instant."""
         told: list[tuple[str, tuple[float, ...], tuple[str, ...]]] = []
         counts = (float(len(picture.track.active)), float(picture.track.untracked))
         told.append(("/track", counts, ("radar tracks", "plots of no track")))
         told.append(("/associate", (float(len(picture.associate.pairs)),), ("pairs",)))
-        registered = picture.register
-        for radar, off in zip(registered.radars, registered.correction.tolist(), strict=True):
-            range_m, azimuth, elevation, late_s = off
-            title, length = f"radar {radar} range error, {self._units.length}", range_m * self._units.lengths
-            told.append((entity("register", "radar", radar), (length,), (title,)))
-            both = (f"radar {radar} azimuth error, degrees", f"radar {radar} elevation error, degrees")
-            told.append((entity("register", "angle", radar), (math.degrees(azimuth), math.degrees(elevation)), both))
-            told.append((entity("register", "time", radar), (1e3 * late_s,), (f"radar {radar} late, ms",)))
         return [Sample(path, picture.now, picture.step, values, names) for path, values, names in told]
 
     def _ended(

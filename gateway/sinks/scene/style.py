@@ -43,6 +43,17 @@ LIVES: dict[str, Colour] = {"tentative": TENTATIVE, "confirmed": FUSED, "coastin
 AXES: tuple[Colour, Colour, Colour] = ((235, 110, 90), (110, 200, 110), (110, 150, 240))  # as everywhere: x, y, z
 HORIZONTAL: Colour = (190, 120, 255)
 VERTICAL: Colour = (70, 200, 190)
+RADARS: tuple[Colour, ...] = (
+    RADAR,
+    (90, 215, 150),
+    (200, 130, 255),
+    (255, 205, 90),
+)  # where several are beside each other
+
+
+def radar_colour(radar: int) -> Colour:
+    """A radar's, where several are beside each other."""
+    return RADARS[(radar - 1) % len(RADARS)]
 
 
 def points(size: float) -> float:

@@ -22,7 +22,7 @@ from gateway.fuse import Ended, Fused
 from gateway.observation import Attitude, GpsReport, RadarPlot, Truth
 from gateway.picture import Event, Health, Picture, SourceHealth, VehicleHealth
 from gateway.predict import Predicted
-from gateway.register import Registered
+from gateway.register import Registered, Residuals
 from gateway.settings import DEMO_SITE, Site
 from gateway.track import Tracked
 
@@ -218,13 +218,22 @@ class _Maker:
             align=self.aligned(time_s, gps, radar),
             track=Tracked((RADAR_TRACK,), 0),
             associate=self.associated(time_s, gps, True),
-            register=Registered.untold((1,), np.zeros((1, 4))),
+            register=registered(now),
             fuse=fused,
             predict=predicted,
             truth=(truth,) if step % 5 == 0 else (),
             health=Health(sources, (self.vehicle(time_s),)),
             events=(Event(now, "info", "the session begins"),) if step == 0 else (),
         )
+
+
+def registered(now: int) -> Registered:
+    """A radar whose errors are found and taken off, with a pair at this instant."""
+    off = np.array([[40.0, 3e-3, 2e-3, 0.02]])
+    pair = Residuals(np.array([now]), np.array([1]), (AIRCRAFT,), off[:, :3], 0.1 * off[:, :3])
+    return Registered(
+        (1,), 0.9 * off, off, 0.1 * off, np.ones((1, 4), np.bool_), (("range: applied",) * 4,), residuals=pair
+    )
 
 
 def slice_predicted(predicted: Predicted, rows: int) -> Predicted:

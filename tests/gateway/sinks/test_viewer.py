@@ -126,7 +126,7 @@ def test_every_view_has_rows_from_early_on(session):
             utc = chunk.to_record_batch().column("utc").cast("int64").to_numpy()
             rows.setdefault(chunk.entity_path, []).append(utc)
     views = list(views_of(blueprint(DEMO_SITE, modes=True).root_container))
-    assert len({view.name for view in views}) == len(views) == 23
+    assert len({view.name for view in views}) == len(views) == 32
     for view in views:
         mine = [utc for name, parts in rows.items() if shows(view, name) for utc in parts]
         assert mine, view.name
