@@ -12,9 +12,11 @@ STUDIES = (
     "rmimm",
     "prediction",
     "consistency",
+    "noise",
     "tuning",
     "registration",
     "clutter",
+    "reconstruction",
 )  # the modules of this package that have a `run`, `-` for `_`
 
 Progress = Callable[[str, float], None]  # what is being done, and the share of the whole that is done

@@ -14,7 +14,19 @@ from gateway.cli.options import Viewer
 from gateway.cli.replay import read_speed
 from gateway.cli.viewing import chosen
 
-COMMANDS = ("demo", "live", "replay", "simulate", "play", "check", "columns", "site", "study", "sessions")
+COMMANDS = (
+    "demo",
+    "live",
+    "replay",
+    "simulate",
+    "play",
+    "check",
+    "columns",
+    "reconstruct",
+    "site",
+    "study",
+    "sessions",
+)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -56,6 +68,11 @@ def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
         (["site", "/nowhere/at/all.tlog"], "cannot be read"),
         (["check", "/nowhere/at/all.tlog"], "cannot be read"),
         (["columns", "/nowhere/at/all.tlog", "--out", "x"], "cannot be read"),
+        (["reconstruct", "/nowhere/at/all.tlog"], "cannot be read"),
+        (["reconstruct", "x.tlog", "--close-on", "home"], "lift-off, threshold, nothing, or degrees"),
+        (["reconstruct", "x.tlog", "--close-on", "threshold"], "--site"),
+        (["reconstruct", "x.tlog", "--lift-off", "91,0"], "--lift-off '91,0'"),
+        (["reconstruct", "x.tlog", "--take-off-speed", "9", "--landing-speed", "9"], "below the take-off speed"),
         (["live", "--mavlink", "udpin:127.0.0.1:0", "--key", "/nowhere/at/all.key"], "all.key"),
         (["live", "--mavlink", "udpin:127.0.0.1:0", "--allow-peer", "home"], "'home' is not a peer"),
         (["live", "--mavlink", "udpin:127.0.0.1:0", "--allow-system", "0"], "'0'"),

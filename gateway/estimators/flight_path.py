@@ -1,0 +1,211 @@
+"""A path from flight parameters: airspeed, heading and pitch integrated, and what closes the integral onto what is known.
+
+A recorder without a position still knows how fast the aircraft flew through the air and where its nose pointed. Integrated,
+that is the path through the air; the wind carries the air along. A known end tells the mean wind; further known places tell
+how it changed. All paths here are level: east and north in metres from the lift-off point. Source: 002-2.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+Floats = NDArray[np.float64]
+
+EARTH_M = 6_371_000.0
+SEA_LEVEL_PA, SEA_LEVEL_K = 101_325.0, 288.15
+_GAS_J_PER_KG_K = 287.052_87
+_LAPSE_K_PER_M = 0.0065
+_EXPONENT = 9.806_65 / (_GAS_J_PER_KG_K * _LAPSE_K_PER_M)
+SMOOTHED_OVER_S, SHORTEST_S = 3.0, 60.0  # of airspeed before it is held against the thresholds; of a sortie
+_MOST_KNOTS = 400  # of the wind: the normal equations are dense
+
+
+def air_velocity(true_airspeed_mps: ArrayLike, compass_heading_rad: ArrayLike, pitch_rad: ArrayLike) -> Floats:
+    """East, north, up (..., 3) in m/s through the air of an aircraft that flies where its nose points.
+
+    Roll turns the aircraft about its own velocity and drops out. Source: 002-2 1.1.
+    """
+    speed, heading, pitch = (
+        np.asarray(one, dtype=np.float64) for one in (true_airspeed_mps, compass_heading_rad, pitch_rad)
+    )
+    level = speed * np.cos(pitch)
+    return np.stack([level * np.sin(heading), level * np.cos(heading), speed * np.sin(pitch)], axis=-1)
+
+
+def integrated(time_s: Floats, velocity_mps: Floats) -> Floats:
+    """The path (n, d) of a velocity (n, d), from 0, by the trapezoid rule. Source: 002-2 1.3."""
+    steps = 0.5 * (velocity_mps[1:] + velocity_mps[:-1]) * np.diff(time_s)[:, None]
+    return np.concatenate([np.zeros((1, velocity_mps.shape[1])), np.cumsum(steps, axis=0)])
+
+
+def on_earth(time_s: Floats, velocity_mps: Floats, latitude_rad: float) -> Floats:
+    """`integrated`, with east and north kept those of the lift-off point, at `latitude_rad`.
+
+    North turns by the sine of the latitude for each radian of longitude: 0.8 degrees in 100 km at 45 degrees.
+    Deviation: 002-2 takes the earth for flat.
+    """
+    flat = integrated(time_s, velocity_mps)
+    latitude = latitude_rad + flat[:, 1] / EARTH_M
+    turned = flat[:, 0] / (EARTH_M * np.cos(latitude)) * np.sin(latitude)
+    sine, cosine = np.sin(turned), np.cos(turned)
+    east, north = velocity_mps[:, 0], velocity_mps[:, 1]
+    level = np.stack([cosine * east - sine * north, cosine * north + sine * east], axis=-1)
+    return integrated(time_s, np.concatenate([level, velocity_mps[:, 2:]], axis=1))
+
+
+def closed(time_s: Floats, path_m: Floats, end_m: ArrayLike) -> tuple[Floats, Floats]:
+    """The path (n, d) with the error at its end spread evenly over time, and the wind (d,) m/s that this is.
+
+    Spreading it in proportion to time is the exact estimate of one constant wind. Source: 002-2 2, step 3.
+    """
+    wind = (np.asarray(end_m, dtype=np.float64) - path_m[-1]) / (time_s[-1] - time_s[0])
+    return path_m + (time_s - time_s[0])[:, None] * wind, wind
+
+
+@dataclass(frozen=True, slots=True)
+class Fixes:
+    """Places that are known: when, s; where (m, 2), metres east and north of lift-off; how well (m,), 1 sigma an axis, m."""
+
+    time_s: Floats
+    place_m: Floats
+    sigma_m: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Tied:
+    """A path that passes known places: (n, 2) m, 1 sigma an axis (n,) m, and the wind that carried it (n, 2) m/s."""
+
+    path_m: Floats
+    sigma_m: Floats
+    wind_mps: Floats
+
+
+def tied(
+    time_s: Floats,
+    path_m: Floats,
+    fixes: Fixes,
+    *,
+    knots_s: float = 30.0,
+    wind_sigma_mps: float = 15.0,
+    wanders_mps_per_sqrt_s: float = 0.2,
+) -> Tied:
+    """The path (n, 2) through the air, carried by the wind that takes it closest to the fixes: least squares over all of it.
+
+    The first sample stays where it is. The wind is linear between knots, and wanders from one to the next as a random walk.
+    With a single exact fix at the end and a wind that does not wander this is `closed`. Source: 002-2, known fixes.
+    """
+    first, length = time_s[0], time_s[-1] - time_s[0]
+    count = min(max(math.ceil(length / knots_s), 1), _MOST_KNOTS)
+    step = length / count
+    weights = _carried((time_s - first) / step, count) * step  # of each knot's wind in the way it has carried, s
+    at_fixes = _carried((fixes.time_s - first) / step, count) * step
+    information = np.zeros((count + 1, count + 1))
+    wanders = np.diff(np.eye(count + 1), axis=0)
+    information += wanders.T @ wanders / (wanders_mps_per_sqrt_s**2 * step)
+    information[0, 0] += 1.0 / wind_sigma_mps**2
+    through_air = np.stack([np.interp(fixes.time_s, time_s, path_m[:, axis]) for axis in (0, 1)], axis=-1)
+    scaled = at_fixes / fixes.sigma_m[:, None]
+    information += scaled.T @ scaled
+    factor = cho_factor(information)
+    found = cho_solve(factor, scaled.T @ ((fixes.place_m - through_air) / fixes.sigma_m[:, None]))
+    covariance = cho_solve(factor, np.eye(count + 1))
+    sigma = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", weights, covariance, weights, optimize=True), 0.0))
+    wind = np.stack(
+        [np.interp((time_s - first) / step, np.arange(count + 1), found[:, axis]) for axis in (0, 1)], axis=-1
+    )
+    return Tied(path_m + weights @ found, sigma, wind)
+
+
+def _carried(knots: Floats, count: int) -> Floats:
+    """(n, count + 1): the integral from 0 to each of `knots` of each hat function on 0, 1, ... count."""
+    since = np.clip(knots[:, None] - np.arange(count + 1), -1.0, 1.0)
+    hats = np.where(since < 0.0, 0.5 * (1.0 + since) ** 2, 0.5 + since - 0.5 * since**2)
+    hats[:, 0] -= 0.5  # the half of the first that lies before 0
+    return hats
+
+
+def true_airspeed(calibrated_mps: ArrayLike, pressure_pa: ArrayLike, temperature_k: ArrayLike = math.nan) -> Floats:
+    """What an airspeed indicator shows, made true: m/s, by the air's density. Without a temperature that of the standard air.
+
+    Compressibility is left out: 0.5 % at 130 m/s.
+    """
+    pressure = np.asarray(pressure_pa, dtype=np.float64)
+    standard = SEA_LEVEL_K * (pressure / SEA_LEVEL_PA) ** (1.0 / _EXPONENT)
+    temperature = np.where(np.isnan(temperature_k), standard, temperature_k)
+    density_ratio = pressure / SEA_LEVEL_PA * SEA_LEVEL_K / temperature
+    return np.asarray(calibrated_mps, dtype=np.float64) / np.sqrt(density_ratio)
+
+
+def pressure_height(pressure_pa: ArrayLike, reference_pa: float) -> Floats:
+    """Height in m above where the pressure is `reference_pa`, in the standard air. 002-2's repair of height from pitch."""
+    ratios = (np.asarray(pressure_pa, dtype=np.float64) / SEA_LEVEL_PA, reference_pa / SEA_LEVEL_PA)
+    high, low = (SEA_LEVEL_K / _LAPSE_K_PER_M * (1.0 - ratio ** (1.0 / _EXPONENT)) for ratio in ratios)
+    return np.asarray(high - low)
+
+
+def standard_pressure(altitude_m: ArrayLike) -> Floats:
+    """The standard air's pressure in Pa at an altitude above mean sea level in m."""
+    return np.asarray(
+        SEA_LEVEL_PA * (1.0 - np.asarray(altitude_m, dtype=np.float64) * _LAPSE_K_PER_M / SEA_LEVEL_K) ** _EXPONENT
+    )
+
+
+def smoothed(time_s: Floats, values: Floats, over_s: float = SMOOTHED_OVER_S) -> Floats:
+    """The mean of each sample's neighbourhood, half of `over_s` to either side; samples may come at any times."""
+    before = np.searchsorted(time_s, time_s - 0.5 * over_s, "left")
+    after = np.searchsorted(time_s, time_s + 0.5 * over_s, "right")
+    sums = np.concatenate([[0.0], np.cumsum(values)])
+    return np.asarray((sums[after] - sums[before]) / (after - before))
+
+
+def sorties(
+    time_s: Floats,
+    airspeed_mps: Floats,
+    take_off_mps: float,
+    landing_mps: float,
+    *,
+    smoothed_over_s: float = SMOOTHED_OVER_S,
+    shortest_s: float = SHORTEST_S,
+) -> list[tuple[int, int]]:
+    """First and last sample of each sortie: it begins above the take-off speed and ends below the lower landing speed.
+
+    Smoothed, because at either speed noise crosses a threshold again and again; what is shorter than `shortest_s` is taxiing.
+    A recording that ends in the air ends its sortie. Source: 002-2 2, step 1. Deviation: two thresholds, smoothing, a minimum.
+    """
+    if not landing_mps < take_off_mps:
+        raise ValueError("the landing speed must be below the take-off speed")
+    calm = smoothed(time_s, airspeed_mps, smoothed_over_s) if smoothed_over_s > 0.0 else airspeed_mps
+    found, place = [], 0
+    above, below = np.flatnonzero(calm > take_off_mps), np.flatnonzero(calm < landing_mps)
+    while (nth := int(np.searchsorted(above, place))) < len(above):
+        first = int(above[nth])
+        ended = int(np.searchsorted(below, first))
+        last = int(below[ended]) if ended < len(below) else len(time_s) - 1
+        if time_s[last] - time_s[first] >= shortest_s:
+            found.append((first, last))
+        if ended == len(below):
+            break
+        place = last
+    return found
+
+
+def heading_bias(
+    compass_heading_rad: Floats, airspeed_mps: Floats, take_off_mps: float, runway_compass_rad: float
+) -> tuple[float, float]:
+    """How much the heading shows too much, and its 1 sigma, rad, of the samples of a take-off roll; NaN where there are none.
+
+    On the ground the nose points along the runway, whichever way it is used. A constant error of the heading turns the whole
+    path, and closing it does not show that. Source: 002-2.
+    """
+    rolls = (airspeed_mps > 0.3 * take_off_mps) & (airspeed_mps < take_off_mps)
+    if np.count_nonzero(rolls) < 2:
+        return math.nan, math.nan
+    off = compass_heading_rad[rolls] - runway_compass_rad
+    off = np.mod(off + 0.5 * math.pi, math.pi) - 0.5 * math.pi  # either way of the runway
+    middle = float(np.median(off))
+    return middle, float(1.4826 * np.median(np.abs(off - middle)) / math.sqrt(len(off)))

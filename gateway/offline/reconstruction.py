@@ -1,0 +1,293 @@
+"""Flights rebuilt from flight parameters: sorties found, integrated, closed or tied, and compared with what positions said.
+
+Source: 002-2. Positions are used only for what is asked: where lift-off was, and as fixes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import astuple, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.estimators import flight_path as paths
+from gateway.geodesy import ecef_to_geodetic, enu_axes, geodetic_to_ecef
+from gateway.offline.parameters import Flown, Parameters, Times
+
+Floats = NDArray[np.float64]
+Place = tuple[float, float]  # latitude, longitude, rad
+
+SECOND = 1_000_000_000
+END_SIGMA_M = 1.0  # of a place on which a path is closed
+USUAL_SIGMA_M = 3.0  # of a position whose stream does not say
+TAKE_OFF_SHARE, LANDING_SHARE = (
+    0.6,
+    0.45,
+)  # of the cruising speed: what most fixed-wing aircraft lift off and touch down at
+GAP_S = 10.0  # a longer silence is not integrated over: what comes after it is a piece of its own
+_FIXES_APART_NS = SECOND
+
+
+class Unplaced(ValueError):
+    """A path should be closed on a place, and nothing tells where it began; the message is part of a sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class How:
+    """How a flight is rebuilt. Speeds None: a share of the cruising speed."""
+
+    take_off_mps: float | None = None
+    landing_mps: float | None = None
+    lift_off: Place | None = None  # where; None: the position that was told nearest to it
+    close_on: Place | str = "lift-off"  # "lift-off", "nothing", or a place
+    runway_compass_rad: float | None = None  # with one the heading's constant error is found on the take-off roll
+    fixes: bool = False  # whether positions tie the path
+    muted: tuple[tuple[int, int], ...] = ()  # positions of these times tie nothing
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """The rebuilt path beside the positions that were told of the same times; distances are level, m."""
+
+    time: Times  # (m,)
+    place_m: Floats  # (m, 2) told: east and north of lift-off
+    height_m: Floats  # (m,) told, above the first of them
+    off_m: Floats  # (m,) the rebuilt path's distance
+    off_open_m: Floats  # (m,) the open path's
+    height_rmse_m: float
+
+    @property
+    def rmse_m(self) -> float:
+        """Of the rebuilt path."""
+        return math.sqrt(float(np.mean(self.off_m**2)))
+
+    @property
+    def open_rmse_m(self) -> float:
+        """Of the path through the air."""
+        return math.sqrt(float(np.mean(self.off_open_m**2)))
+
+    @property
+    def length_m(self) -> float:
+        """Of the way over the ground, by the positions."""
+        return float(np.linalg.norm(np.diff(self.place_m, axis=0), axis=1).sum())
+
+
+@dataclass(frozen=True, slots=True)
+class Sortie:
+    """One flight. Paths are east and north of lift-off, m; heights above lift-off, m."""
+
+    time: Times  # (n,)
+    open_m: Floats  # (n, 3) integrated alone; its height is that of the pitch
+    path_m: Floats  # (n, 2) closed or tied
+    sigma_m: Floats  # (n,) 1 sigma an axis, by how much wind usually changes; NaN for an open path
+    height_m: Floats  # (n,) by pressure
+    wind_mps: Floats  # (n, 2) where the air moves to, east and north
+    roll_rad: Floats
+    pitch_rad: Floats
+    compass_rad: Floats  # with its constant error taken off
+    true_airspeed_mps: Floats
+    end_error_m: float  # of the open path, from where it should have ended; NaN where nothing tells
+    heading_bias_rad: float
+    heading_bias_sigma_rad: float
+    lift_off: Place | None
+    height_by: str  # "pressure", "altitude", "pitch"
+    took_off: bool  # it began above the take-off speed, not with the recording
+    landed: bool  # it ended below the landing speed, not with the recording
+    compared: Compared | None
+    fixes: int
+
+    @property
+    def geodetic_deg(self) -> Floats | None:
+        """Latitude and longitude (n, 2) of the path, degrees; None where nothing tells where it began."""
+        if self.lift_off is None:
+            return None
+        east, north = self.path_m.T
+        curved = -(east**2 + north**2) / (2.0 * paths.EARTH_M)  # on the ellipsoid, not on the plane that touches it
+        around = enu_axes(*self.lift_off).T
+        ecef = np.stack([east, north, curved], axis=-1) @ around.T + geodetic_to_ecef(*self.lift_off, 0.0)
+        latitude, longitude, _ = ecef_to_geodetic(ecef)
+        return np.degrees(np.stack([latitude, longitude], axis=-1))
+
+    @property
+    def duration_s(self) -> float:
+        """From lift-off to touchdown."""
+        return float(self.time[-1] - self.time[0]) / SECOND
+
+    @property
+    def length_m(self) -> float:
+        """Of the rebuilt way over the ground."""
+        return float(np.linalg.norm(np.diff(self.path_m, axis=0), axis=1).sum())
+
+
+def speeds(airspeed_mps: Floats) -> tuple[float, float]:
+    """Take-off and landing speed of an aircraft that cruises as this one does, m/s."""
+    fast = airspeed_mps[airspeed_mps > 0.5 * np.percentile(airspeed_mps, 99.0)]
+    cruise = float(np.median(fast)) if len(fast) else 0.0
+    return TAKE_OFF_SHARE * cruise, LANDING_SHARE * cruise
+
+
+def reconstructed(parameters: Parameters, how: How = How()) -> list[Sortie]:
+    """Every sortie of one aircraft, of which `parameters.lacks()` nothing; none where airspeed never rises. Raises Unplaced."""
+    flown = Flown.of(parameters)
+    if not len(flown.time):
+        return []
+    usual = speeds(flown.airspeed_mps)
+    take_off = usual[0] if how.take_off_mps is None else how.take_off_mps
+    landing = min(usual[1], 0.75 * take_off) if how.landing_mps is None else how.landing_mps
+    if not 0.0 < landing < take_off:
+        return []
+    places = parameters.places.columns()
+    sorties: list[Sortie] = []
+    for piece in flown.pieces(GAP_S):
+        time_s = (piece.time - piece.time[0]) * 1e-9
+        found = paths.sorties(time_s, piece.airspeed_mps, take_off, landing)
+        sorties += [_sortie(piece, first, end, take_off, places, how) for first, end in found]
+    return sorties
+
+
+def _sortie(flown: Flown, first: int, end: int, take_off_mps: float, places: tuple[Times, Floats], how: How) -> Sortie:
+    part, took_off, landed = slice(first, end + 1), first > 0, end < len(flown.time) - 1
+    time, time_s = flown.time[part], (flown.time[part] - flown.time[first]) * 1e-9
+    bias = _heading_bias(flown, first, take_off_mps, how.runway_compass_rad)
+    compass = flown.compass_rad[part] - (0.0 if math.isnan(bias[0]) else bias[0])
+    pressure, height, height_by = _heights(flown, part)
+    speed = paths.true_airspeed(flown.airspeed_mps[part], pressure, flown.temperature_k[part])
+    velocity = paths.air_velocity(speed, compass, flown.pitch_rad[part])
+    lift_off = how.lift_off or _nearest_place(places, int(time[0]))
+    through_air = (
+        paths.integrated(time_s, velocity) if lift_off is None else paths.on_earth(time_s, velocity, lift_off[0])
+    )
+    if height is None:
+        height = through_air[:, 2]
+    knows_its_end = landed and (took_off or how.close_on != "lift-off")
+    target = _target(how.close_on, lift_off) if knows_its_end else None
+    fixes = _fixes(places, time, lift_off, how)
+    carried = _carried(time_s, through_air[:, :2], target, fixes, isinstance(how.close_on, str))
+    return Sortie(
+        time=time,
+        open_m=through_air,
+        path_m=carried.path_m,
+        sigma_m=carried.sigma_m,
+        height_m=height,
+        wind_mps=carried.wind_mps,
+        roll_rad=flown.roll_rad[part],
+        pitch_rad=flown.pitch_rad[part],
+        compass_rad=compass,
+        true_airspeed_mps=speed,
+        end_error_m=math.nan if target is None else float(np.linalg.norm(through_air[-1, :2] - target)),
+        heading_bias_rad=bias[0],
+        heading_bias_sigma_rad=bias[1],
+        lift_off=lift_off,
+        height_by=height_by,
+        took_off=took_off,
+        landed=landed,
+        compared=None if lift_off is None else _compared(places, time, through_air, carried.path_m, height, lift_off),
+        fixes=0 if fixes is None else len(fixes.time_s),
+    )
+
+
+def _target(close_on: Place | str, lift_off: Place | None) -> Floats | None:
+    """Where the path ends, east and north of lift-off, m; None: nobody says. Raises Unplaced."""
+    if close_on == "nothing":
+        return None
+    if isinstance(close_on, str):
+        return np.zeros(2)
+    if lift_off is None:
+        raise Unplaced("no position tells where it lifted off, so a path cannot be closed on a place")
+    return np.asarray(level_m(np.array([close_on[0]]), np.array([close_on[1]]), lift_off)[0])
+
+
+def _carried(
+    time_s: Floats, path_m: Floats, target_m: Floats | None, fixes: paths.Fixes | None, usual_end: bool
+) -> paths.Tied:
+    """The path through the air, carried by the wind: by fixes, by its end, or, where nothing tells, not at all.
+
+    Where fixes tell, that it came back to where it lifted off is no more than a guess; a place that was given is one of them.
+    """
+    ends = None if target_m is None else paths.Fixes(time_s[-1:], target_m[None], np.array([END_SIGMA_M]))
+    if fixes is not None:
+        if ends is not None and not usual_end:
+            fixes = paths.Fixes(*(np.concatenate(pair) for pair in zip(astuple(fixes), astuple(ends), strict=True)))
+        return paths.tied(time_s, path_m, fixes)
+    if ends is None or target_m is None:
+        return paths.Tied(path_m, np.full(len(time_s), math.nan), np.full(path_m.shape, math.nan))
+    path, wind = paths.closed(time_s, path_m, target_m)
+    return paths.Tied(path, paths.tied(time_s, path_m, ends).sigma_m, np.broadcast_to(wind, path.shape))
+
+
+def _heading_bias(
+    flown: Flown, first: int, take_off_mps: float, runway_compass_rad: float | None
+) -> tuple[float, float]:
+    """Of the roll in the minute before lift-off."""
+    if runway_compass_rad is None:
+        return math.nan, math.nan
+    since = int(np.searchsorted(flown.time, flown.time[first] - 60 * SECOND))
+    roll = slice(since, first)
+    return paths.heading_bias(flown.compass_rad[roll], flown.airspeed_mps[roll], take_off_mps, runway_compass_rad)
+
+
+def _heights(flown: Flown, part: slice) -> tuple[Floats, Floats | None, str]:
+    """Pressure, height above lift-off, and what the height is of; None: pitch must do."""
+    pressure, altitude = flown.pressure_pa[part], flown.altitude_m[part]
+    if not np.isnan(pressure).any():
+        return pressure, paths.pressure_height(pressure, float(pressure[0])), "pressure"
+    if not np.isnan(altitude).any():
+        return paths.standard_pressure(altitude), altitude - altitude[0], "altitude"
+    return np.full(len(altitude), paths.SEA_LEVEL_PA), None, "pitch"
+
+
+def level_m(latitude_rad: Floats, longitude_rad: Floats, lift_off: Place) -> Floats:
+    """East and north (n, 2) of lift-off, m, of places on the ellipsoid."""
+    here = np.zeros_like(latitude_rad)
+    axes = enu_axes(*lift_off)[:2]
+    from_here = geodetic_to_ecef(latitude_rad, longitude_rad, here) - geodetic_to_ecef(*lift_off, 0.0)
+    return np.stack([from_here @ axis for axis in axes], axis=-1)
+
+
+def _nearest_place(places: tuple[Times, Floats], at: int) -> Place | None:
+    """The position told nearest to an instant, if within 5 s."""
+    time, values = places
+    if not len(time):
+        return None
+    nearest = int(np.argmin(np.abs(time - at)))
+    if abs(int(time[nearest]) - at) > 5 * SECOND:
+        return None
+    return float(values[nearest, 0]), float(values[nearest, 1])
+
+
+def _fixes(places: tuple[Times, Floats], time: Times, lift_off: Place | None, how: How) -> paths.Fixes | None:
+    """The positions that may tie the path, at most one a second; None where there are none."""
+    told_at, values = places
+    if not how.fixes or lift_off is None:
+        return None
+    good = (told_at >= time[0]) & (told_at <= time[-1])
+    for since, until in how.muted:
+        good &= ~((told_at >= since) & (told_at < until))
+    second = told_at // _FIXES_APART_NS
+    good &= np.concatenate([[True], second[1:] != second[:-1]])
+    if not good.any():
+        return None
+    sigma = np.where(np.isnan(values[good, 4]), USUAL_SIGMA_M, values[good, 4])
+    return paths.Fixes((told_at[good] - time[0]) * 1e-9, level_m(values[good, 0], values[good, 1], lift_off), sigma)
+
+
+def _compared(
+    places: tuple[Times, Floats], time: Times, open_m: Floats, path_m: Floats, height_m: Floats, lift_off: Place
+) -> Compared | None:
+    told_at, values = places
+    within = (told_at >= time[0]) & (told_at <= time[-1])
+    if np.count_nonzero(within) < 2:
+        return None
+    at_s = (told_at[within] - time[0]) * 1e-9
+    time_s = (time - time[0]) * 1e-9
+    told = level_m(values[within, 0], values[within, 1], lift_off)
+    rebuilt, alone = (
+        np.stack([np.interp(at_s, time_s, axis) for axis in one.T], -1) for one in (path_m, open_m[:, :2])
+    )
+    off, off_alone = (np.linalg.norm(one - told, axis=1) for one in (rebuilt, alone))
+    high = np.where(np.isnan(values[within, 2]), values[within, 3], values[within, 2])
+    high = high - high[0]
+    lower = np.interp(at_s, time_s, height_m) - high
+    height_rmse = math.sqrt(float(np.mean((lower - lower[0]) ** 2)))
+    return Compared(told_at[within], told, high, off, off_alone, height_rmse)
