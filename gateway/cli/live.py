@@ -174,6 +174,7 @@ def live(
     estimator: take.EstimatorOption = take.Estimator.kalman,
     weighting: take.WeightingOption = take.Weighting.bias,
     association: take.AssociationOption = take.Association.default,
+    registration: take.RegistrationOption = take.Registration.apply,
     key: take.KeyOption = None,
     allow_peer: AllowPeerOption = None,
     allow_system: AllowSystemOption = None,
@@ -206,7 +207,7 @@ def live(
     signing_key = take.read_signing_key(key)
     setup = Setup(
         place=place,
-        options=take.choose(weighting, association, estimator),
+        options=take.choose(weighting, association, estimator, registration),
         archive=archive,
         serve=take.read_serve(serve, looks),
         publish=take.read_urls([publish], MAVLINK_PORT)[0] if publish else None,
@@ -215,6 +216,7 @@ def live(
         keys=take.read_keys(place, site),
         signing_key=signing_key,
         live=True,
+        takes_up=registration is not take.Registration.off,
         command=tuple(sys.argv[1:]),
     )
     speaks = heartbeat or request_rates or fetch_mission

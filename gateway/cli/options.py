@@ -49,6 +49,14 @@ class Association(StrEnum):
     literal = "literal"
 
 
+class Registration(StrEnum):
+    """What is done about what radars measure too much."""
+
+    apply = "apply"
+    watch = "watch"
+    off = "off"
+
+
 SiteOption = Annotated[
     Path | None,
     typer.Option(
@@ -98,6 +106,13 @@ WeightingOption = Annotated[
 AssociationOption = Annotated[
     Association,
     typer.Option("--association", help="When a radar track and an aircraft are one: ours, or paper 003's literally."),
+]
+RegistrationOption = Annotated[
+    Registration,
+    typer.Option(
+        "--registration",
+        help="What radars measure too much: apply learns it and takes it off, watch only tells it, off does neither.",
+    ),
 ]
 KeyOption = Annotated[
     Path | None,
@@ -169,11 +184,21 @@ def read_urls(texts: list[str], default_port: int) -> list[Url]:
         raise UsageError(str(error)) from error
 
 
-def choose(weighting: Weighting, association: Association, estimator: Estimator = Estimator.kalman) -> Options:
+def choose(
+    weighting: Weighting,
+    association: Association,
+    estimator: Estimator = Estimator.kalman,
+    registration: Registration = Registration.apply,
+) -> Options:
     """The options of a run."""
     from gateway.settings import Options
 
-    return Options(estimator=estimator.value, weighting=weighting.value, association=association.value)
+    return Options(
+        estimator=estimator.value,
+        weighting=weighting.value,
+        association=association.value,
+        registration=registration.value,
+    )
 
 
 def read_serve(text: str | None, viewer: Viewer) -> Serve | None:
@@ -195,6 +220,7 @@ def change(
     weighting: Weighting | None,
     association: Association | None,
     estimator: Estimator | None = None,
+    registration: Registration | None = None,
 ) -> Options:
     """The options with what was asked for in place of what was archived."""
     from dataclasses import replace
@@ -205,4 +231,6 @@ def change(
         options = replace(options, association=association.value)
     if estimator is not None:
         options = replace(options, estimator=estimator.value)
+    if registration is not None:
+        options = replace(options, registration=registration.value)
     return options

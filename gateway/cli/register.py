@@ -136,7 +136,8 @@ def _gather(playback: Playback, place: Place, gathering: Gathering, tell: Callab
             gathering.take(picture)
         tell(playback.fraction())
 
-    run_replay(playback, Setup(place=place, options=playback.options, is_watched=False), watch=watch)
+    setup = Setup(place=place, options=playback.options, remembered=playback.remembered, is_watched=False)
+    run_replay(playback, setup, watch=watch)
 
 
 def _document(result: Result, method: Method) -> dict[str, Any]:

@@ -104,6 +104,14 @@ AssociationOption = Annotated[
     take.Association | None,
     typer.Option("--association", help="When two are one. (default: the session's, else default)", show_default=False),
 ]
+RegistrationOption = Annotated[
+    take.Registration | None,
+    typer.Option(
+        "--registration",
+        help="What radars measure too much: learnt and taken off, only told, or neither. (default: the session's, else apply)",
+        show_default=False,
+    ),
+]
 SmoothOption = Annotated[
     bool,
     typer.Option(
@@ -181,6 +189,7 @@ def replay(
     estimator: EstimatorOption = None,
     weighting: WeightingOption = None,
     association: AssociationOption = None,
+    registration: RegistrationOption = None,
     smooth: SmoothOption = False,
     key: take.KeyOption = None,
     quiet: take.QuietOption = False,
@@ -204,7 +213,7 @@ def replay(
         playback = open_playback(files, read_plans(plan), signing_key)
         found = place or playback.place or playback.find_place()
         has_own_place = place is not None or playback.place is not None
-        options = take.change(playback.options, weighting, association, estimator)
+        options = take.change(playback.options, weighting, association, estimator, registration)
         if smooth and options.estimator not in SMOOTHED:
             raise UsageError(
                 f"--smooth cannot go back over {options.estimator}, which keeps no covariances that hold together; "
@@ -216,6 +225,7 @@ def replay(
             options=options,
             archive=archive,
             serve=take.read_serve(serve, looks),
+            remembered=playback.remembered,
             keys=take.read_keys(place, site),
             signing_key=signing_key,
             is_watched=pace is not None or looks is not take.Viewer.none,

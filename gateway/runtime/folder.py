@@ -17,14 +17,18 @@ from pathlib import Path
 from typing import Any, cast
 
 from adapters import Kind, Source
+from gateway.register import Remembered
+from gateway.runtime.remembering import is_of, read_remembered
+from gateway.runtime.setup import Setup
 from gateway.runtime.typed import misfit
-from gateway.settings import Mute, Options
+from gateway.settings import Mute, Options, Site
 
 SESSION_FILE = "session.json"
 INPUTS = "inputs"
 FORMAT = 1
 _YEAR_2200 = 7_258_118_400 * 10**9
 _LEAST, _LARGEST = 1e-3, 1e6  # of an option's seconds, sigmas and counts
+_SESSIONS_AT_MOST = 200  # that are looked through, the newest first: their names begin with when they began
 _LEAST_FREE_BYTES = 32 << 20  # below, a session would end before it was worth anything
 
 
@@ -61,7 +65,8 @@ class Record:
     site: str | None = None  # the site file's text
     site_origin: str = ""
     epoch_offset_s: int | None = None
-    registration: None = None  # what was known of the radars' errors at the start; later issues fill it
+    registration: Remembered | None = None  # what was known of the radars' errors at the start, from an earlier session
+    registered: Remembered | None = None  # and what is known of them by now
     flows: None = None
     sources: tuple[InputFile, ...] = ()
     counters: Mapping[str, int] = field(default_factory=dict)
@@ -140,12 +145,31 @@ def read_record(folder: Path) -> Record:
         raise FolderError(f"{path} lacks or spoils what a session needs ({error}).") from error
 
 
+def remembered_for(setup: Setup, site: Site) -> Remembered | None:
+    """What is known of a site's radars before a session: what it was given, or what the last one there in the archive learnt."""
+    if not setup.takes_up or setup.archive is None:
+        return setup.remembered
+    try:
+        folders = sorted((one for one in setup.archive.iterdir() if one.is_dir()), reverse=True)
+    except OSError:
+        return None  # there is none yet
+    for folder in folders[:_SESSIONS_AT_MOST]:
+        try:
+            record = read_record(folder)
+        except FolderError:
+            continue
+        if record.command[:1] == ("live",) and record.registered is not None and is_of(record.registered, site):
+            return record.registered
+    return None
+
+
 def _record(document: dict[str, Any]) -> Record:
     known = {name.name for name in fields(Record)}
     plain = {key: value for key, value in document.items() if key in known}
     plain["command"] = tuple(document["command"])
     plain["options"] = read_options(document["options"])
     plain["sources"] = tuple(_input_file(row) for row in document["sources"])
+    plain |= {name: read_remembered(plain.get(name)) for name in ("registration", "registered")}
     record = Record(**plain)
     numbers = [source.number for source in record.sources]
     spoiled = misfit(record) or _out_of_range(record) or ("sources" if len(set(numbers)) < len(numbers) else None)

@@ -22,7 +22,7 @@ from gateway import __version__
 from gateway.observation import Heard
 from gateway.picture import Picture
 from gateway.pipeline import State, initial, step
-from gateway.runtime.folder import Record, make_folder, session_name
+from gateway.runtime.folder import Record, make_folder, remembered_for, session_name
 from gateway.runtime.mutes import Muting
 from gateway.runtime.opening import Opening
 from gateway.runtime.outputs import Outputs
@@ -43,8 +43,7 @@ class Run:
         self.place: Place | None = None
         self.folder: Path | None = None
         self.outputs: Outputs | None = None
-        self._wall_began = time.monotonic_ns()
-        self._flushed = self._wall_began
+        self._wall_began = self._flushed = time.monotonic_ns()
         self._watermark = started_at
         self._first_at: int | None = None
         self._sources: dict[int, Source] = {}
@@ -88,10 +87,11 @@ class Run:
     def _settle(self, place: Place) -> None:
         """From now on the place is known: the pipeline and the sinks can begin."""
         self.place = place
-        self._state = initial(place.site, self.setup.options)
+        remembered = remembered_for(self.setup, place.site)
+        self._state = initial(place.site, self.setup.options, remembered, self.started_at)
         self._tally = Tally(place.site.runway)
         if self._recorder is not None:
-            self._recorder.describe(site=place.text, site_origin=place.origin)
+            self._recorder.describe(site=place.text, site_origin=place.origin, registration=remembered)
         try:
             self.outputs = Outputs(place.site, self.folder, self.setup)
         except OSError as error:
@@ -212,9 +212,8 @@ class Run:
         return picture
 
     def _flush_when_due(self) -> None:
-        now = time.monotonic_ns()
-        if now - self._flushed >= _FLUSH_NS:
-            self._flushed = now
+        if time.monotonic_ns() - self._flushed >= _FLUSH_NS:
+            self._flushed = time.monotonic_ns()
             self.flush()
 
     def flush(self) -> None:
@@ -222,7 +221,8 @@ class Run:
         if self._recorder is None:
             return
         try:
-            self._recorder.describe(epoch_offset_s=self._decoder.epoch_offset_s)
+            registered = None if self._state is None else self._state.to_remember(self._watermark)
+            self._recorder.describe(epoch_offset_s=self._decoder.epoch_offset_s, registered=registered)
             self._recorder.flush(self._watermark, self._counters())
         except OSError as error:
             raise self._failure(error) from error

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from gateway.register import Remembered
 from gateway.runtime.urls import Url
 from gateway.settings import Options, Site
 
@@ -45,6 +46,8 @@ class Setup:
     keys: Mapping[int, bytes] = field(default_factory=dict)  # a radar's number -> its key
     signing_key: bytes | None = field(default=None, repr=False)  # of MAVLink; None: frames are believed unchecked
     live: bool = False
+    remembered: Remembered | None = None  # what was known of the radars' errors when the session began
+    takes_up: bool = False  # what the last live session of this site, in the archive, has learnt of its radars
     is_watched: bool = True  # False: drawn in large batches, for a replay as fast as it goes that nobody looks at
     smooth: bool = False  # make smoothed tracks when it is over
     name: str = ""  # of the session's folder; without one the site's
