@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from bench.clutter import clutter
 from bench.estimation import estimation
 from bench.live_fleet import live_fleet
 from bench.live_rates import live_rates
@@ -37,6 +38,7 @@ class Part(StrEnum):
     pipeline = "pipeline"
     wires = "wires"
     estimation = "estimation"
+    clutter = "clutter"
     fleet = "fleet"
     hours = "hours"
 
@@ -93,6 +95,9 @@ def _measure(wanted: set[Part], runs: int, seconds: float, console: Console) -> 
         if Part.estimation in wanted:
             say("interacting models: ours, a textbook's loop and other libraries'")
             figures += estimation(runs, say)
+        if Part.clutter in wanted:
+            say("targets in clutter: ours and Stone Soup's trackers")
+            figures += clutter(runs, say)
         if Part.fleet in wanted:
             say("100 vehicles with two radars, and 1000 aircraft, live")
             figures += live_fleet(RATES_S)

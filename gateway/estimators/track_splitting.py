@@ -11,7 +11,7 @@ Source: 002-6. Deviation: the likelihood belongs to the family and not to each h
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,11 +41,10 @@ class Splitting:
     acceleration_density: tuple[float, ...]  # m^2/s^3, for each axis
     greatest_speed_mps: float
     detection: float = 0.9  # of a target, in each look
-    newborn: float = 0.02  # likelihood of a track from one plot that nothing explains
-    survival: float = 0.999  # from scan to scan
+    survival: float = 0.999  # from look to look
     confirm_at: float = 0.999
     end_below: float = 0.05  # a confirmed track
-    drop_below: float = 0.01  # one that is not
+    drop_below: float = 0.3  # one that is not, in parts of what it began with
     least_weight: float = 0.05  # of a hypothesis within its family
     hypotheses: int = 5  # of a family
     budget: int = 4000  # of all hypotheses
@@ -53,11 +52,16 @@ class Splitting:
 
 @dataclass(frozen=True, slots=True)
 class Plots:
-    """The m plots of one look: values and variances (k, m), NaN = not measured, and how dense clutter is there."""
+    """The m plots of one look: values and variances (k, m), NaN = not measured, and what else may have been seen there.
+
+    `clutter` and `newborn` (m,): how many clutter plots, and how many targets that were not there before, are expected of a look
+    in a unit of the measured components' volume. Their ratio is how likely a plot that nothing explains is a target.
+    """
 
     value: Floats
     variance: Floats
-    clutter: Floats  # (m,) clutter plots of a look in a unit of the measured components' volume
+    clutter: Floats
+    newborn: Floats
     at: Ints  # (m,) ns
     serial: Ints  # (m,) how the caller names them, from 1
 
@@ -85,6 +89,17 @@ class _Pairs:
     likelihood: Floats  # detected there, against clutter there
 
 
+@dataclass(frozen=True, slots=True)
+class _Weighed:
+    """How likely all is after a scan: families (f,), hypotheses without a plot (n,) and with one (p,)."""
+
+    existence: Floats
+    stays: Floats
+    splits: Floats
+    unexplained: Floats  # (m,)
+    contested: bool  # a plot lies with two families
+
+
 def scan(
     bank: Bank, plots: Plots, at: int, sight: Sight, model: Splitting, looked: Bools | None = None
 ) -> tuple[Bank, Scan]:
@@ -92,27 +107,17 @@ def scan(
 
     Plots need not be of that very instant. What a scan costs follows the number of pairs of hypothesis and plot.
     """
-    mean, covariance = moved(bank.mean, bank.covariance, (at - bank.at) / SECOND, np.array(model.acceleration_density))
+    mean, covariance = moved(bank.mean, bank.covariance, (at - bank.at) / SECOND, model.acceleration_density)
     seen = np.full(len(bank.number), model.detection)
     if looked is not None:
         seen *= looked
     pairs = _paired(mean, covariance, plots, at, sight, seen[bank.family])
-    existence, stays, splits, unexplained, contested = _weighed(bank, pairs, seen, len(plots), model)
-    grown = replace(
-        bank,
-        at=at,
-        mean=mean,
-        covariance=covariance,
-        existence=existence,
-        looks=bank.looks + (1 if looked is None else looked),
-        looked=np.full(len(seen), at) if looked is None else np.where(looked, at, bank.looked),
-        confirmed=bank.confirmed | (existence >= model.confirm_at),
-    )
-    grown = _split(grown, pairs, stays, splits, plots.serial, model, looked)
-    if contested:
+    weighed = _weighed(bank, pairs, seen, len(plots), model)
+    grown = _split(bank, mean, covariance, pairs, weighed, plots.serial, at, model, looked)
+    if weighed.contested:
         grown = distinct(grown)
-    grown, left_out = bounded(_with_new(grown, plots, unexplained, at, sight, model), model.budget)
-    return grown, Scan(unexplained, left_out)
+    grown, left_out = bounded(_with_new(grown, plots, weighed.unexplained, at, sight, model), model.budget)
+    return grown, Scan(weighed.unexplained, left_out)
 
 
 def _paired(mean: Floats, covariance: Floats, plots: Plots, at: int, sight: Sight, detection: Floats) -> _Pairs:
@@ -127,14 +132,13 @@ def _paired(mean: Floats, covariance: Floats, plots: Plots, at: int, sight: Sigh
         furthest_s = float(np.abs(lead_s).max())
         rates = np.einsum("kan,abn,kbn->kn", slope, covariance[axes:, axes:], slope)
         reach += furthest_s * (np.abs(np.einsum("kan,an->kn", slope, mean[axes:])) + np.sqrt(gate * rates))
-    reach[:, detection <= 0.0] = -np.inf
-    row, plot = near(expected, reach, plots.value, np.sqrt(gate * plots.variance))
+    row, plot = near(expected, reach, plots.value, np.sqrt(gate * plots.variance), sight.turn)
     off = sight.off(plots.value[:, plot], expected[:, row])
     slope = slope if slope.shape[2] == 1 else slope[:, :, row]
     each_mean, each_covariance, distance, log_density = corrected(
         mean[:, row], covariance[:, :, row], off, plots.variance[:, plot], slope, lead_s[plot] if late else None
     )
-    inside = distance <= GATE[len(expected) - np.isnan(off).sum(axis=0)]
+    inside = (distance <= GATE[len(expected) - np.isnan(off).sum(axis=0)]) & (detection[row] > 0.0)
     if not inside.all():
         row, plot, log_density = row[inside], plot[inside], log_density[inside]
         each_mean, each_covariance = each_mean[:, inside], each_covariance[:, :, inside]
@@ -142,40 +146,48 @@ def _paired(mean: Floats, covariance: Floats, plots: Plots, at: int, sight: Sigh
     return _Pairs(row, plot, each_mean, each_covariance, likelihood)
 
 
-def _weighed(
-    bank: Bank, pairs: _Pairs, seen: Floats, plots: int, model: Splitting
-) -> tuple[Floats, Floats, Floats, Floats, bool]:
-    """Likelihoods (f,) after the scan; weights of hypotheses without a plot (n,) and with one (p,); what no track explains (m,).
-
-    And whether any plot lies with two families. Source: 002-6 eq 6 to 8; their beta_j is what `shared` gives.
-    """
+def _weighed(bank: Bank, pairs: _Pairs, seen: Floats, plots: int, model: Splitting) -> _Weighed:
+    """What the scan says of families and hypotheses. Source: 002-6 eq 6 to 8; their beta_j is what `shared` gives."""
     families = len(seen)
     of = bank.family[pairs.row]
     evidence = bank.weight[pairs.row] * pairs.likelihood
-    key, edge = np.unique(of * plots + pairs.plot, return_inverse=True)
-    family, plot = key // max(plots, 1), key % max(plots, 1)
-    by_edge = np.bincount(edge, evidence, minlength=len(key))
+    key: Ints = of * max(plots, 1) + pairs.plot
+    edge: Ints | None = None
+    by_edge = evidence
+    if len(bank) != families:  # several hypotheses of a family may have one plot
+        key, edge = np.unique(key, return_inverse=True)
+        by_edge = np.bincount(edge, evidence, minlength=len(key))
+    family, plot = np.divmod(key, max(plots, 1))
     before = model.survival * bank.existence
     missed = before * (1.0 - IN_GATE * seen)
     none = 1.0 - before + missed
-    chance, nothing, unexplained = shared(family, plot, before[family] * by_edge, none, plots)
+    chance, nothing, unexplained, contested = shared(family, plot, before[family] * by_edge, none, plots)
     unseen = nothing * missed / none
     existence = np.maximum(unseen + np.bincount(family, chance, minlength=families), TINY)
     stays = bank.weight * (unseen / existence)[bank.family]
-    splits = evidence * (chance / np.maximum(by_edge, TINY))[edge] / existence[of]
-    contested = len(plot) > 0 and bool(np.bincount(plot).max() > 1)
-    return existence, stays, splits, unexplained, contested
+    share = chance / np.maximum(by_edge, TINY)
+    splits = evidence * (share if edge is None else share[edge]) / existence[of]
+    return _Weighed(existence, stays, splits, unexplained, contested)
 
 
 def _split(
-    bank: Bank, pairs: _Pairs, stays: Floats, splits: Floats, serial: Ints, model: Splitting, looked: Bools | None
+    bank: Bank,
+    mean: Floats,
+    covariance: Floats,
+    pairs: _Pairs,
+    weighed: _Weighed,
+    serial: Ints,
+    at: int,
+    model: Splitting,
+    looked: Bools | None,
 ) -> Bank:
-    """The children that are kept, in order of family and of weight: the likeliest of each family that lives on."""
-    parents = len(stays)
-    weight = np.concatenate([stays, splits])
+    """The children that are kept: the likeliest of each family that lives on, in order of family and of weight."""
+    parents = len(weighed.stays)
+    weight = np.concatenate([weighed.stays, weighed.splits])
     family = np.concatenate([bank.family, bank.family[pairs.row]])
-    alive = bank.existence >= np.where(bank.confirmed, model.end_below, model.drop_below)
-    some = np.flatnonzero((weight >= model.least_weight) & alive[family])
+    existence = weighed.existence
+    lives = existence >= np.where(bank.confirmed, model.end_below, model.drop_below * bank.first)
+    some = np.flatnonzero((weight >= model.least_weight) & lives[family])
     some = some[np.lexsort((-weight[some], family[some]))]
     place = rank(family[some])
     if len(place) and place.max() >= model.hypotheses:
@@ -184,25 +196,41 @@ def _split(
     pair = some[child] - parents
     parent = some.copy()
     parent[child] = pairs.row[pair]
-    mean, covariance = bank.mean[:, parent], bank.covariance[:, :, parent]
+    mean, covariance = mean[:, parent], covariance[:, :, parent]
     mean[:, child], covariance[:, :, child] = pairs.mean[:, pair], pairs.covariance[:, :, pair]
-    newest = np.zeros(len(some), np.int64)
-    newest[child] = serial[pairs.plot[pair]]
-    path = np.concatenate([newest[None], bank.path[:-1, parent]])
+    newest = np.zeros((1, len(some)), np.int64)
+    newest[0, child] = serial[pairs.plot[pair]]
+    path = np.concatenate([newest, bank.path[:-1, parent]])
     if looked is not None:
         path = np.where(looked[family[some]], path, bank.path[:, parent])
-    kept = replace(bank, mean=mean, covariance=covariance, family=family[some], path=path, weight=weight[some])
-    return merged(kept, weight[some])
+    families = len(existence)
+    grown = Bank(
+        at,
+        mean,
+        covariance,
+        weight[some],
+        family[some],
+        path,
+        existence,
+        bank.first,
+        bank.number,
+        bank.looks + (1 if looked is None else looked),
+        bank.confirmed | (existence >= model.confirm_at),
+        np.full(families, at) if looked is None else np.where(looked, at, bank.looked),
+        bank.next_number,
+    )
+    return merged(grown)
 
 
 def _with_new(bank: Bank, plots: Plots, unexplained: Floats, at: int, sight: Sight, model: Splitting) -> Bank:
     """The same with a family for every plot that tells a place and that no track explains."""
     new = np.flatnonzero(unexplained >= NEW_AT)
     whole, position, scatter = sight.placed(plots.value[:, new], plots.variance[:, new])
-    new = new[whole]
+    new = new if whole.all() else new[whole]
     axes, rate = len(position), np.arange(len(position), 2 * len(position))
     mean = np.concatenate([position, np.zeros_like(position)])
     covariance = np.zeros((2 * axes, 2 * axes, len(new)))
     covariance[:axes, :axes] = scatter
     covariance[rate, rate] = (0.5 * model.greatest_speed_mps) ** 2
-    return begun(bank, mean, covariance, plots.serial[new], model.newborn * unexplained[new], at)
+    existence = unexplained[new] * plots.newborn[new] / (plots.newborn[new] + plots.clutter[new])
+    return begun(bank, mean, covariance, plots.serial[new], existence, at)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators.track_splitting_gates import near
+from gateway.observation import made_swiftly
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -19,6 +20,7 @@ TWINS = 1.0  # families, by less than a sigma, and by a plot that both took late
 LATELY = 4  # looks
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class Bank:
     """f families and their n hypotheses at an instant: in order of family, the likeliest of each first."""
@@ -30,6 +32,7 @@ class Bank:
     family: Ints  # (n,) from 0
     path: Ints  # (PATH, n) serials of the last plots, newest first, 0 = none in that look
     existence: Floats  # (f,) the track likelihood
+    first: Floats  # (f,) that it began with
     number: Ints  # (f,) never used again
     looks: Ints  # (f,) since it began, that look included
     confirmed: Bools  # (f,)
@@ -41,7 +44,7 @@ class Bank:
         """Nothing is known."""
         mean, covariance = np.zeros((2 * axes, 0)), np.zeros((2 * axes, 2 * axes, 0))
         none, path = np.zeros(0), np.zeros((PATH, 0), np.int64)
-        return cls(at, mean, covariance, none, path[0], path, none, path[0], path[0], path[0] > 0, path[0])
+        return cls(at, mean, covariance, none, path[0], path, none, none, path[0], path[0], path[0] > 0, path[0])
 
     def __len__(self) -> int:
         """How many hypotheses there are."""
@@ -55,26 +58,29 @@ class Bank:
 
 def chosen(bank: Bank, keep: Bools, weight: Floats) -> Bank:
     """Some of the hypotheses, with new weights that are brought to 1; families without one are gone."""
+    family = bank.family[keep]
     alive = np.zeros(len(bank.number), np.bool_)
-    alive[bank.family[keep]] = True
-    if not (keep.all() and alive.all()):
-        family = bank.family[keep]
-        renamed = np.cumsum(alive) - 1
-        bank = replace(
-            bank,
-            mean=bank.mean[:, keep],
-            covariance=bank.covariance[:, :, keep],
-            family=renamed[family],
-            path=bank.path[:, keep],
-            existence=bank.existence[alive],
-            number=bank.number[alive],
-            looks=bank.looks[alive],
-            confirmed=bank.confirmed[alive],
-            looked=bank.looked[alive],
-        )
-        weight = weight[keep]
-    total = np.bincount(bank.family, weight, minlength=len(bank.number))
-    return replace(bank, weight=weight / total[bank.family])
+    alive[family] = True
+    weight = weight[keep]
+    if not alive.all():
+        family = (np.cumsum(alive) - 1)[family]
+    total = np.bincount(family, weight, minlength=1)
+    every = len(weight) == len(keep)
+    return Bank(
+        bank.at,
+        bank.mean if every else bank.mean[:, keep],
+        bank.covariance if every else bank.covariance[:, :, keep],
+        weight / total[family],
+        family,
+        bank.path if every else bank.path[:, keep],
+        bank.existence[alive],
+        bank.first[alive],
+        bank.number[alive],
+        bank.looks[alive],
+        bank.confirmed[alive],
+        bank.looked[alive],
+        bank.next_number,
+    )
 
 
 def rank(family: Ints) -> Ints:
@@ -82,13 +88,12 @@ def rank(family: Ints) -> Ints:
     return np.arange(len(family)) - np.searchsorted(family, family)
 
 
-def merged(bank: Bank, weight: Floats) -> Bank:
+def merged(bank: Bank) -> Bank:
     """Hypotheses that tell nearly the same as their family's likeliest become one with it."""
-    place = rank(bank.family)
-    other = np.flatnonzero(place)
-    keep = np.ones(len(place), np.bool_)
+    weight, keep = bank.weight, np.ones(len(bank), np.bool_)
+    other = np.flatnonzero(bank.family[1:] == bank.family[:-1]) + 1
     if len(other):
-        first = other - place[other]
+        first = other - rank(bank.family)[other]
         state = np.arange(len(bank.mean))
         off = bank.mean[:, other] - bank.mean[:, first]
         same = (off * off <= ALIKE * bank.covariance[state, state][:, first]).all(axis=0)
@@ -151,6 +156,7 @@ def begun(bank: Bank, mean: Floats, covariance: Floats, serial: Ints, existence:
         np.concatenate([bank.family, np.arange(families, families + count)]),
         np.concatenate([bank.path, path], axis=1),
         np.concatenate([bank.existence, existence]),
+        np.concatenate([bank.first, existence]),
         np.concatenate([bank.number, np.arange(bank.next_number, bank.next_number + count)]),
         np.concatenate([bank.looks, np.ones(count, np.int64)]),
         np.concatenate([bank.confirmed, np.zeros(count, np.bool_)]),

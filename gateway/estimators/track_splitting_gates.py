@@ -12,11 +12,16 @@ FEW = 4096  # predictions times plots: up to here comparing all with all is quic
 CELLS_AT_MOST = 1 << 20  # of the grid, along one axis
 
 
-def near(expected: Floats, reach: Floats, value: Floats, spread: Floats) -> tuple[Ints, Ints]:
+def near(
+    expected: Floats, reach: Floats, value: Floats, spread: Floats, turn: float | None = None
+) -> tuple[Ints, Ints]:
     """Pairs (prediction, plot), in this order: no component further apart than reach + spread.
 
-    expected, reach (k, n); value, spread (k, m), NaN = not measured, which is near everything.
+    expected, reach (k, n); value, spread (k, m), NaN = not measured, which is near everything. `turn`: after how much the second
+    component is the same again, None = never.
     """
+    if turn is not None:
+        return _all_around(expected, reach, value, spread, turn)
     n, m = expected.shape[1], value.shape[1]
     if n * m <= FEW:
         return _all_with_all(expected, reach, value, spread)
@@ -29,6 +34,24 @@ def near(expected: Floats, reach: Floats, value: Floats, spread: Floats) -> tupl
     row, plot = np.concatenate([row, other_row]), np.concatenate([whole[plot], rest[other_plot]])
     order = np.lexsort((plot, row))
     return row[order], plot[order]
+
+
+def _all_around(expected: Floats, reach: Floats, value: Floats, spread: Floats, turn: float) -> tuple[Ints, Ints]:
+    """The same where the second component is an angle: plots near its ends are looked at from both."""
+    m = value.shape[1]
+    margin = reach[1].max(initial=0.0) + spread[1].max(initial=0.0)
+    low, high = expected[1].min(initial=0.0) - margin, expected[1].max(initial=0.0) + margin
+    again = [np.flatnonzero((value[1] + way >= low) & (value[1] + way <= high)) for way in (-turn, turn)]
+    which = np.concatenate([np.arange(m), *again])
+    shifted, wide = value[:, which], spread[:, which]
+    shifted[1, m : m + len(again[0])] -= turn
+    shifted[1, m + len(again[0]) :] += turn
+    row, plot = near(expected, reach, shifted, wide)
+    plot = which[plot]
+    if not (len(again[0]) or len(again[1])):
+        return row, plot
+    key = np.unique(row * max(m, 1) + plot)
+    return np.divmod(key, max(m, 1))
 
 
 def _all_with_all(expected: Floats, reach: Floats, value: Floats, spread: Floats) -> tuple[Ints, Ints]:

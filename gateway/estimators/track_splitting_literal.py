@@ -106,8 +106,7 @@ def begin(plots: Plots, at: int, sight: Sight, model: Printed) -> Tracks:
 def scan(tracks: Tracks, plots: Plots, at: int, sight: Sight, model: Printed) -> Tracks:
     """The tracks after one more scan at an instant (ns). Source: 002-6 eq 5 to 15."""
     axes = len(tracks.mean) // 2
-    density = np.array(model.acceleration_density)
-    mean, covariance = moved(tracks.mean, tracks.covariance, (at - tracks.at) / SECOND, density)
+    mean, covariance = moved(tracks.mean, tracks.covariance, (at - tracks.at) / SECOND, model.acceleration_density)
     expected, slope = sight.measured(mean[:axes])
     gate = GATE[len(expected)]
     reach = np.sqrt(gate * np.einsum("kan,abn,kbn->kn", slope, covariance[:axes, :axes], slope))

@@ -6,6 +6,7 @@ after the other, which needs no inverse and lets any of them be missing; all are
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -17,8 +18,15 @@ Bools = NDArray[np.bool_]
 LOG_TAU = float(np.log(2.0 * np.pi))
 
 
+_AXES = {axes: np.eye(axes)[:, :, None] for axes in (2, 3)}
+
+
 class Sight(Protocol):
     """How a sensor measures positions along A axes in k components."""
+
+    @property
+    def turn(self) -> float | None:
+        """After how much the second component is the same again, if it is an angle all around."""
 
     def measured(self, position: Floats) -> tuple[Floats, Floats]:
         """What it would measure of positions (A, n): values (k, n) and their derivatives (k, A, n), or (k, A, 1) if constant."""
@@ -33,9 +41,11 @@ class Sight(Protocol):
 class Plane:
     """A sensor that measures the axes themselves. As the paper's: x and y."""
 
+    turn: float | None = None
+
     def measured(self, position: Floats) -> tuple[Floats, Floats]:
         """The positions themselves."""
-        return position, np.eye(len(position))[:, :, None]
+        return position, _AXES[len(position)]
 
     def off(self, value: Floats, expected: Floats) -> Floats:
         """Their differences."""
@@ -50,20 +60,23 @@ class Plane:
         return whole, value[:, whole], covariance
 
 
-def moved(mean: Floats, covariance: Floats, elapsed_s: float, density: Floats) -> tuple[Floats, Floats]:
+def moved(mean: Floats, covariance: Floats, elapsed_s: float, density: tuple[float, ...]) -> tuple[Floats, Floats]:
     """States after a time at constant velocity, shaken by white acceleration of spectral densities (A,), m^2/s^3."""
     half, t = len(mean) // 2, elapsed_s
     mean, covariance = mean.copy(), covariance.copy()
     mean[:half] += t * mean[half:]
     covariance[:half] += t * covariance[half:]
     covariance[:, :half] += t * covariance[:, half:]
-    axis = np.arange(half)
-    noise = np.zeros((*covariance.shape[:2], 1))
-    noise[axis, axis, 0] = density * (t * t * abs(t) / 3.0)
-    noise[axis, axis + half, 0] = noise[axis + half, axis, 0] = density * (t * abs(t) / 2.0)
-    noise[axis + half, axis + half, 0] = density * abs(t)
-    covariance += noise
+    covariance += _noise(t, density)
     return mean, covariance
+
+
+@lru_cache(maxsize=256)  # scans come at one interval
+def _noise(elapsed_s: float, density: tuple[float, ...]) -> Floats:
+    t, shaken = abs(elapsed_s), np.diag(density)
+    noise = np.block([[t**3 / 3.0 * shaken, t**2 / 2.0 * shaken], [t**2 / 2.0 * shaken, t * shaken]])[:, :, None]
+    noise.flags.writeable = False
+    return noise
 
 
 def corrected(

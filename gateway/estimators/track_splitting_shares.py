@@ -17,26 +17,27 @@ ROUNDS_AT_MOST = 30
 SETTLED = 1e-3  # of a message
 
 
-def shared(track: Ints, plot: Ints, weight: Floats, none: Floats, plots: int) -> tuple[Floats, Floats, Floats]:
-    """Chances (e,) of the pairs, (t,) of tracks to have no plot, (m,) of plots to have no track.
+def shared(track: Ints, plot: Ints, weight: Floats, none: Floats, plots: int) -> tuple[Floats, Floats, Floats, bool]:
+    """Chances (e,) of the pairs, (t,) of tracks to have no plot, (m,) of plots to have no track; and whether any plot is shared.
 
     weight (e,) of track[e] having plot[e], none (t,) of a track having none, both in the same units: how likely they are
     against the plot being clutter. A track has at most one pair with a plot.
     """
     tracks = len(none)
     free = np.ones(len(track))
-    often = np.bincount(plot, minlength=plots)
-    contested = often.max(initial=0) > 1
+    contested = bool(np.bincount(plot, minlength=plots).max(initial=0) > 1)
     for _ in range(ROUNDS_AT_MOST if contested else 1):
         open_ = weight * free
         total = none + np.bincount(track, open_, minlength=tracks)
         claim = weight / (total[track] - open_)
         claimed = 1.0 + np.bincount(plot, claim, minlength=plots)
+        if not contested:
+            return open_ / total[track], none / total, np.asarray(1.0 / claimed), False
         after = 1.0 / (claimed[plot] - claim)
-        done = not contested or np.abs(after - free).max(initial=0.0) < SETTLED
+        change = np.abs(after - free).max()
         free = after
-        if done:
+        if change < SETTLED:
             break
     open_ = weight * free
     total = none + np.bincount(track, open_, minlength=tracks)
-    return open_ / total[track], none / total, np.asarray(1.0 / claimed)
+    return open_ / total[track], none / total, np.asarray(1.0 / claimed), True

@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 
 SCANS, PERIOD_S, SIDE_M, SPEED_MPS = 100, 6.0, 20_000.0, 30.0
 DENSITY, DETECTION, SIGMA_M = 0.5e-6, 0.9, 50.0
+NEWBORN = 1e-8  # targets that come, a scan and square metre: four in the whole square
 SETTLED = 15  # scans after which tracks should stand
 ON_TARGET_M = 300.0  # six sigma of a plot
 KEPT_SHARE = 0.9  # of the scans
@@ -65,7 +66,9 @@ def plots_of(true_m: Floats, random: np.random.Generator, density: float = DENSI
         count = value.shape[1]
         at = np.full(count, round(place * PERIOD_S * 1e9))
         serials = np.arange(serial + 1, serial + count + 1)
-        yield Plots(value, np.full(value.shape, SIGMA_M**2), np.full(count, density), at, serials)
+        yield Plots(
+            value, np.full(value.shape, SIGMA_M**2), np.full(count, density), np.full(count, NEWBORN), at, serials
+        )
         serial += count
 
 

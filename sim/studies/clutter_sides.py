@@ -109,7 +109,7 @@ def _assigned(known: _Nearest, plots: Plots, elapsed_s: float) -> tuple[_Nearest
     """Tracks with the plots that lie nearest to them in all, and the plots (m,) that no track has."""
     from scipy.optimize import linear_sum_assignment
 
-    mean, covariance = moved(known.mean, known.covariance, elapsed_s, np.array(DENSITY))
+    mean, covariance = moved(known.mean, known.covariance, elapsed_s, DENSITY)
     reach = np.sqrt(GATE * covariance[[0, 1], [0, 1]])
     row, plot = near(mean[:2], reach, plots.value, np.sqrt(GATE * plots.variance))
     off = plots.value[:, plot] - mean[:2, row]

@@ -16,20 +16,31 @@ MODEL = Splitting((1.0, 1.0), 60.0)
 SECOND, SIGMA_M, CLUTTER = 1_000_000_000, 50.0, 0.5e-6
 
 
-def plots(value: object, at_s: float, first: int = 1) -> Plots:
+def plots(value: object, at_s: float, first: int = 1, newborn: float = 1e-8) -> Plots:
     """Plots of one scan at positions (m, 2), NaN = not measured."""
     given = np.array(value, dtype=float).reshape(-1, 2).T
     m = given.shape[1]
     at = np.full(m, round(at_s * SECOND))
-    return Plots(given, np.full(given.shape, SIGMA_M**2), np.full(m, CLUTTER), at, np.arange(first, first + m))
+    return Plots(
+        given,
+        np.full(given.shape, SIGMA_M**2),
+        np.full(m, CLUTTER),
+        np.full(m, newborn),
+        at,
+        np.arange(first, first + m),
+    )
 
 
-def worked(scans: list[object], period_s: float = 6.0, model: Splitting = MODEL) -> Bank:
+def worked(scans: list[object], period_s: float = 6.0, model: Splitting = MODEL, newborn: float = 1e-8) -> Bank:
     """The bank after scans of plots."""
     bank = Bank.empty(0, 2)
     for place, value in enumerate(scans):
         bank, _ = scan(
-            bank, plots(value, place * period_s, 1000 * place + 1), round(place * period_s * SECOND), Plane(), model
+            bank,
+            plots(value, place * period_s, 1000 * place + 1, newborn),
+            round(place * period_s * SECOND),
+            Plane(),
+            model,
         )
     return bank
 
@@ -43,11 +54,11 @@ def test_the_recursion_has_the_paper_s_unit_values() -> None:
 
 def test_a_family_s_likelihood_is_bayes_rule() -> None:
     """One family and no plot: P (1 - PD PG) / (1 - P + P (1 - PD PG)); one plot in its gate: by the ratio of densities."""
-    model = Splitting((1.0, 1.0), 60.0, survival=1.0, newborn=0.5, drop_below=1e-6)
-    alone = worked([[[0, 0]], []], model=model)
+    model = Splitting((1.0, 1.0), 60.0, survival=1.0, drop_below=1e-6)
+    alone = worked([[[0, 0]], []], model=model, newborn=CLUTTER)
     missed = 1.0 - 0.9 * 0.999
     assert alone.existence == pytest.approx(0.5 * missed / (0.5 + 0.5 * missed))
-    both = worked([[[0, 0]], [[0, 0]]], model=model)
+    both = worked([[[0, 0]], [[0, 0]]], model=model, newborn=CLUTTER)
     scatter = 2.0 * SIGMA_M**2 + (6.0 * 30.0) ** 2 + 6.0**3 / 3.0
     ratio = 0.9 / (2.0 * np.pi * scatter) / CLUTTER
     assert both.existence[0] == pytest.approx((missed + ratio) / (1.0 + missed + ratio))
@@ -64,11 +75,13 @@ def test_a_target_in_every_scan_is_confirmed_and_ends_by_its_likelihood_alone() 
 
 def test_two_families_cannot_both_have_one_plot() -> None:
     """Where two sure tracks reach for one plot, their chances for it add up to at most one; alone each would be sure of it."""
-    chance, none, free = shared(np.array([0, 1]), np.array([0, 0]), np.array([100.0, 100.0]), np.array([0.1, 0.1]), 1)
+    chance, none, free, _ = shared(
+        np.array([0, 1]), np.array([0, 0]), np.array([100.0, 100.0]), np.array([0.1, 0.1]), 1
+    )
     assert chance.sum() + free[0] == pytest.approx(1.0, abs=0.02)
     assert chance[0] == pytest.approx(0.5, abs=0.01)
     assert none + chance == pytest.approx([1.0, 1.0])
-    alone, _, _ = shared(np.array([0]), np.array([0]), np.array([100.0]), np.array([0.1]), 1)
+    alone, _, _, _ = shared(np.array([0]), np.array([0]), np.array([100.0]), np.array([0.1]), 1)
     assert alone[0] == pytest.approx(100.0 / 100.1)
 
 
@@ -86,7 +99,7 @@ def test_shared_chances_are_those_of_all_joint_associations() -> None:
                 if plot < 3:
                     exact[t, plot] += product
     track, plot = np.divmod(np.arange(9), 3)
-    chance, _, _ = shared(track, plot, weight.ravel(), none, 3)
+    chance, _, _, _ = shared(track, plot, weight.ravel(), none, 3)
     assert chance == pytest.approx((exact / total).ravel(), abs=0.05)
 
 
@@ -102,6 +115,14 @@ def test_the_grid_finds_what_all_with_all_finds(partial: float) -> None:
     wanted = np.nonzero(~apart.any(axis=0))
     assert (row == wanted[0]).all()
     assert (plot == wanted[1]).all()
+
+
+def test_an_angle_is_near_from_both_ends() -> None:
+    """Plots just beyond half a turn lie near predictions just before it, each pair once."""
+    expected, reach = np.array([[1000.0, 1000.0], [3.13, 0.0]]), np.full((2, 2), 0.05)
+    value = np.array([[1000.0, 1000.0, 1000.0], [-3.14, 3.12, 0.01]])
+    row, plot = near(expected, reach, value, np.zeros_like(value), 2.0 * np.pi)
+    assert list(zip(row.tolist(), plot.tolist(), strict=True)) == [(0, 0), (0, 1), (1, 2)]
 
 
 def test_components_one_by_one_are_the_kalman_update() -> None:
@@ -149,7 +170,7 @@ def test_a_plot_of_another_instant_tells_of_that_instant() -> None:
         same, _ = scan(same, plots(value, 6.0 * place), round(6.0 * place * SECOND), Plane(), MODEL)
         at = round((6.0 * place + 0.5) * SECOND)
         early, _ = scan(early, plots(value, 6.0 * place), at, Plane(), MODEL)
-    carried, _ = moved(same.mean, same.covariance, 0.5, np.array([1.0, 1.0]))
+    carried, _ = moved(same.mean, same.covariance, 0.5, (1.0, 1.0))
     assert early.mean[:, early.best[0]] == pytest.approx(carried[:, same.best[0]], abs=0.5)
 
 
