@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from gateway import align, associate, fuse, predict, register, track
 from gateway.align import SECOND, Fix, Plot
-from gateway.associate import Change, Setting, Spans
+from gateway.associate import Change, MultiRadar, Setting, Spans
 from gateway.frames import RadarFrame
 from gateway.fuse import Adopted, Ended, Joint, Lanes, LifeChange, Scene, Settled
 from gateway.fuse.filtering import Job
@@ -41,6 +41,7 @@ class Making:
         self.plots: list[Plot] = []
         self.checks: list[associate.Check] = []
         self.changes: list[Change] = []
+        self.of_radars: list[MultiRadar] = []
         self.rows: list[Row] = []
         self.ended: list[Ended] = []
         self.lived: list[LifeChange] = []
@@ -139,7 +140,7 @@ class Making:
             observations=observations,
             align=align.draw(self.fixes, self.plots, self.frame, self.radar_frames),
             track=track.table(self.tracks, self.untracked),
-            associate=associate.table(self.checks, self.association.ledger, self.changes),
+            associate=associate.table(self.checks, self.association.ledger, self.changes, self.of_radars),
             register=register.table(self.registration, self.radars, self.now or 0, self.residuals),
             fuse=replace(table, settled=tuple(self.settled)),
             predict=predict.table(self.forecasts, self.frame),

@@ -15,7 +15,7 @@ from gateway.fuse.consistency import Finding
 from gateway.making import NAMED_AT_MOST
 from gateway.observation import Heard
 from gateway.picture import Event
-from gateway.register import WAIT_NS, gathered, residuals
+from gateway.register import WAIT_NS, gathered, remaining, residuals
 from gateway.track import Key, RadarTracks
 
 PLOT_MARGIN_S = 4.0  # plots are remembered this much longer than reports: a report's check looks back over them
@@ -177,20 +177,22 @@ class Work(Arriving):
         """Radar tracks of several radars that are one target, brought into one system track; and others out of it."""
         if len(self.radars) < 2:
             return
-        seen, alive = associate.compared(self.association.together, at, self.tracks, self.radar_frames, {})
-        self.association = replace(self.association, together=seen)
+        allowed = remaining(self.registration, self.radars, at)
+        state, seen = associate.compared(self.association.together, at, self.tracks, self.radar_frames, allowed)
+        self.association = replace(self.association, together=state)
         known, found = self._spans, fuse.spans_with(self.association.ledger.spans, self.lanes.adopted)
-        groups = associate.together(alive, seen.one)
+        groups, alive = associate.together(seen.keys, state.one), frozenset(seen.keys)
         done = fuse.regrouped(self.lanes, groups, alive, found, known, self.tracks, at)
-        if done.lanes is self.lanes:
-            return
-        self.events += [Event(at, "info", text) for text in done.told]
-        self.lanes = done.lanes
-        self.lanes, jobs = fuse.reroute(self.lanes, known, self._scene())
-        self.jobs = {job.track: job for job in jobs}
-        self._settle()
-        self.lanes, ended = fuse.joined(self.lanes, self._spans, self.tracks, at)
-        self.ended += ended
+        if done.lanes is not self.lanes:
+            self.events += [Event(at, "info", text) for text in done.told]
+            self.lanes = done.lanes
+            self.lanes, jobs = fuse.reroute(self.lanes, known, self._scene())
+            self.jobs = {job.track: job for job in jobs}
+            self._settle()
+            self.lanes, ended = fuse.joined(self.lanes, self._spans, self.tracks, at)
+            self.ended += ended
+        theirs = fuse.radar_tracks_of_aircraft(self.lanes, self._spans, seen.keys)
+        self.of_radars.append(associate.combined(seen, theirs, allowed, self.frame))
 
     # register -----------------------------------------------------------------------------------------------------
 

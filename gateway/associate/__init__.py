@@ -8,7 +8,7 @@ they touch and what followed from these, so that the result is that of in-order 
 `gates` compares one report with the radar tracks near it; `ledger` counts and pairs; `checks` keeps both in order of time.
 
 Radar tracks of several radars are compared with each other, too, whether a position source is there or not (paper 004, figure 1):
-`tracklets` says where each was a moment ago, `pairing` which pairs fit, `joining` counts.
+`tracklets` says where each was a moment ago, `pairing` which pairs fit, `joining` counts, and `combining` makes one of them.
 """
 
 from gateway.associate.checks import (
@@ -23,9 +23,11 @@ from gateway.associate.checks import (
     pruned,
     table,
 )
+from gateway.associate.combining import MultiRadar, combined
 from gateway.associate.gates import SILENT_S, Comparison, Setting
 from gateway.associate.joining import Together, compared, together
 from gateway.associate.ledger import Change, Count, Ledger, Span, Spans, aircraft_of, ordinal_of
+from gateway.associate.pairing import Systematic
 
 __all__ = [
     "SILENT_S",
@@ -36,14 +38,17 @@ __all__ = [
     "Comparison",
     "Count",
     "Ledger",
+    "MultiRadar",
     "Setting",
     "Span",
     "Spans",
+    "Systematic",
     "Together",
     "aircraft_of",
     "await_plots",
     "check_again",
     "check_due",
+    "combined",
     "compared",
     "forgotten",
     "missing",

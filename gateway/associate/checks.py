@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix, Plot
+from gateway.associate.combining import MultiRadar
 from gateway.associate.gates import SILENT_S, Comparison, Nearby, Setting, compare, compare_again
 from gateway.associate.joining import Together
 from gateway.associate.ledger import FAST_CHECKS_S, Change, Ledger, Spans, count
@@ -35,6 +36,7 @@ class Associated:
     check_counter: Ints  # (k,) after the check
     pairs: tuple[tuple[str, str], ...]  # (aircraft, radar track)
     changes: tuple[Change, ...]
+    radars: MultiRadar = field(default_factory=MultiRadar)  # what several radars alone have of aircraft
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -223,7 +225,9 @@ def _fold(
     return ledger
 
 
-def table(checks: Sequence[Check], ledger: Ledger, changes: Sequence[Change]) -> Associated:
+def table(
+    checks: Sequence[Check], ledger: Ledger, changes: Sequence[Change], radars: Sequence[MultiRadar] = ()
+) -> Associated:
     """Some checks as columns, with the pairs of a ledger."""
     rows = [(check, comparison) for check in checks for comparison in check.comparisons]
     counters = [check.after.value(check.fix.aircraft, comparison.key) for check, comparison in rows]
@@ -237,4 +241,5 @@ def table(checks: Sequence[Check], ledger: Ledger, changes: Sequence[Change]) ->
         check_counter=np.array(counters, dtype=np.int64),
         pairs=ledger.spans.named_pairs,
         changes=tuple(changes),
+        radars=MultiRadar.of(radars),
     )

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from gateway.associate.ledger import FAST_HITS
 from gateway.associate.pairing import Pair, Systematic, judged
-from gateway.associate.tracklets import tracklets
+from gateway.associate.tracklets import Tracklets, tracklets
 from gateway.frames import RadarFrame
 from gateway.track import Key, RadarTracks
 
@@ -30,11 +30,12 @@ def compared(
     tracks: RadarTracks,
     radars: Mapping[int, RadarFrame],
     systematic: Mapping[int, Systematic],
-) -> tuple[Together, frozenset[Key]]:
-    """The state after the check of one instant, and the radar tracks that took part in it."""
-    if len({key[0] for key in tracks.plots}) < 2:
-        return Together(), frozenset()
-    seen = tracklets(tracks, at, radars)
+) -> tuple[Together, Tracklets]:
+    """The state after the check of one instant, and the radar tracks that took part in it.
+
+    `systematic`: 1 sigma of what radars may still be off by, of those of which it is known.
+    """
+    seen = tracklets(tracks if len({key[0] for key in tracks.plots}) > 1 else RadarTracks(), at, radars)
     alive = frozenset(seen.keys)
     counts = {
         pair: value for pair, value in state.counts.items() if pair[0] in tracks.plots and pair[1] in tracks.plots
@@ -48,7 +49,7 @@ def compared(
             counts[pair] = min(counts.get(pair, 0) + 1, FAST_HITS) if hit else max(counts.get(pair, 0) - 1, 0)
     counts = {pair: value for pair, value in counts.items() if value}
     kept = frozenset(pair for pair in state.one if pair in counts)
-    return Together(counts, _made(kept, counts, alive)), alive
+    return Together(counts, _made(kept, counts, alive)), seen
 
 
 def _made(one: frozenset[Pair], counts: Mapping[Pair, int], alive: frozenset[Key]) -> frozenset[Pair]:

@@ -34,6 +34,7 @@ _STEP = (1.0, 1e-5, 1e-5, 0.1, 1e-6, 1e-6)  # for derivatives
 class Tracklets:
     """n radar tracks at one instant: position and velocity in the runway's ENU, and what noise and radar's errors do to them."""
 
+    at: int  # ns
     keys: tuple[Key, ...]
     radar: Ints  # (n,)
     state: Floats  # (n, 6) m, m/s
@@ -52,9 +53,8 @@ def tracklets(tracks: RadarTracks, at: int, radars: Mapping[int, RadarFrame]) ->
     radar = np.array([key[0] for key, _ in chosen], np.int64)
     state, by_polar = _placed(np.concatenate([value, rate], axis=1), radar, radars)
     covariance = by_polar @ spread @ by_polar.transpose(0, 2, 1)
-    return Tracklets(
-        tuple(key for key, _ in chosen), radar, state, covariance, np.ascontiguousarray(by_polar[:, :, :3])
-    )
+    keys = tuple(key for key, _ in chosen)
+    return Tracklets(middle, keys, radar, state, covariance, np.ascontiguousarray(by_polar[:, :, :3]))
 
 
 def _recent(plots: tuple[Plot, ...], at: int) -> list[Plot]:

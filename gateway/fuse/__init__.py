@@ -7,7 +7,7 @@ holds the four ways to weigh a position source against a radar; `rows` makes the
 """
 
 from gateway.fuse.continuing import adopted_earlier, continued, reviewed, spans_with, taken_on
-from gateway.fuse.joints import Regrouped, regrouped, remembered
+from gateway.fuse.joints import Regrouped, radar_tracks_of_aircraft, regrouped, remembered
 from gateway.fuse.lanes import Adopted, Ended, Joint, Lane, Lanes, contains, emptied, joined
 from gateway.fuse.life import LifeChange, end_silent, sentence, told
 from gateway.fuse.placing import Scene, lane_of, reroute, take_fix, take_plot
@@ -35,6 +35,7 @@ __all__ = [
     "joined",
     "knows_height",
     "lane_of",
+    "radar_tracks_of_aircraft",
     "regrouped",
     "remaining",
     "remembered",

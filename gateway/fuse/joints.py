@@ -171,5 +171,15 @@ def _moving(group: Sequence[Key], target: int, sky: _Sky, joints: Sequence[Joint
     return moving
 
 
+def radar_tracks_of_aircraft(lanes: Lanes, spans: Spans, keys: Iterable[Key]) -> dict[int, list[Key]]:
+    """Of some radar tracks, those that are aircraft now, by their system tracks."""
+    found: dict[int, list[Key]] = {}
+    for key in keys:
+        track = lanes.by_aircraft.get(spans.pairs.get(key, ""))
+        if track is not None:
+            found.setdefault(track, []).append(key)
+    return found
+
+
 def _who(lane: Lane) -> str:
     return f"track {lane.track}" + (f", {lane.aircraft}" if lane.aircraft else "")

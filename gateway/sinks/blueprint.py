@@ -57,7 +57,7 @@ def _picture_page(site: Site, modes: bool) -> rrb.Horizontal:
                 _plot(f"Biases, {units.length}", ["/register/gps/**", "/register/error/range/**"]),
                 *([_plot("Modes", ["/fuse/modes/**"])] if modes else []),
                 _plot(f"Speed, {units.speed}", ["/fuse/**", "- /fuse/modes/**", "- /fuse/sigma/**"]),
-                _plot(f"Sigma, {units.length}", ["/fuse/sigma/**"]),
+                _plot(f"Sigma, {units.length}", ["/fuse/sigma/**", "/track/**", "- /track"]),
                 _plot("Association", ["/associate/**"]),
                 _plot("Lateness, s", ["/align/**"]),
             ),
@@ -127,7 +127,7 @@ def scene_view(site: Site) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin="/",
         name=f"{site.name}: approach",
-        contents=["/site/**", "/raw/**", "/fuse/**", "/predict/**", "/truth/**", "/associate/**"],
+        contents=["/site/**", "/raw/**", "/track/**", "/fuse/**", "/predict/**", "/truth/**", "/associate/**"],
         background=rrb.Background(color=(14, 17, 22)),
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.1 * reach_m, color=(255, 255, 255, 14)),
         eye_controls=rrb.EyeControls3D(
@@ -161,7 +161,7 @@ def map_view(site: Site) -> rrb.MapView:
     return rrb.MapView(
         origin="/",
         name="Map",
-        contents=["/site/**", "/raw/**", "/fuse/**", "/predict/**", "/truth/**"],
+        contents=["/site/**", "/raw/**", "/track/**", "/fuse/**", "/predict/**", "/truth/**"],
         zoom=10.0 + closer,
     )
 

@@ -20,6 +20,7 @@ from gateway.sinks.scene.flown import Flights
 from gateway.sinks.scene.health import HealthScene
 from gateway.sinks.scene.paths import ApproachScene, PredictScene
 from gateway.sinks.scene.plans import PlanScene
+from gateway.sinks.scene.radars import MultiRadarScene
 from gateway.sinks.scene.register import RegisterScene
 from gateway.sinks.scene.scope import ScopeScene
 from gateway.sinks.scene.site import SiteScene
@@ -70,7 +71,7 @@ class RerunSink:
         self._flights, self._sources, self._tracks = Flights(site), SourceScene(site), TrackScene(site)
         self._approach, self._predict, self._stages = ApproachScene(site), PredictScene(site), StageScene(site)
         self._scope, self._health, self._plans = ScopeScene(site), HealthScene(), PlanScene(site)
-        self._smoothed, self._register = SmoothedScene(site), RegisterScene(site)
+        self._smoothed, self._register, self._radars = SmoothedScene(site), RegisterScene(site), MultiRadarScene(site)
         self._period_ns, self._rows_limit = round(period_s * 1e9), rows_limit
         self._rest_ns = self._period_ns
         self._waiting: list[Picture] = []
@@ -142,6 +143,7 @@ class RerunSink:
         entries: list[Entry] = [
             *self._sources.entries(pictures, heard),
             *self._scope.entries(heard, flights),
+            *self._radars.entries(pictures),
             *self._tracks.entries(flights),
             *self._approach.entries(flights),
             *self._predict.entries(pictures, flights),

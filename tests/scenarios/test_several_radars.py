@@ -10,6 +10,8 @@ import pytest
 
 from adapters import Arrival, Source
 from adapters.decode import Decoder
+from gateway.associate import MultiRadar
+from gateway.frames import RunwayFrame
 from gateway.observation import GpsReport, Heard, Observation, RadarPlot
 from gateway.picture import Picture
 from gateway.pipeline import initial, step
@@ -240,6 +242,30 @@ def test_a_radar_whose_error_hides_it_from_the_position_source_comes_with_the_ot
     assert not any("mavlink:1 is radar track 2/101" in said for said in flown.said)
     late = {(row.aircraft, row.radar_track) for row in flown.since(PAIRED_WITHIN_S)}
     assert late == {("mavlink:1", "1/1 2/101")}
+
+
+def test_the_radars_own_track_is_kept_apart_from_the_position_source() -> None:
+    """Beside the fused track, each second what both radars alone have of it: to the truth, and the same whatever GPS says."""
+    scene, other = (scene_of(ONE, 25.0, f"gps.error_north_m={off_m}") for off_m in (0.0, 30.0))
+    radars, same = (MultiRadar.of([one.associate.radars for one in fly(each).pictures]) for each in (scene, other))
+    assert len(radars.time) >= 15
+    assert set(radars.radar_track) == {"1/1 2/101"}
+    late = slice(len(radars.time) - 15, None)
+    assert radars.runway_m[late].tobytes() == same.runway_m[late].tobytes()
+    flown = scene.flown(scene.aircraft[0], (radars.time - START_NS) / SECOND)
+    frame = RunwayFrame(scene.site.runway)
+    truth = frame.runway_from_geodetic(flown.latitude_rad, flown.longitude_rad, flown.height_m)
+    error_m = np.linalg.norm(radars.runway_m - truth, axis=1)
+    assert (
+        error_m.max() < 60.0
+    )  # a plot's own error is 15 m along and 32 m across at 32 km; a dozen of each radar are in it
+    assert error_m.max() < 4.0 * np.linalg.norm(radars.sigma_m, axis=1).min()
+
+
+def test_with_one_radar_there_is_no_multi_radar_track() -> None:
+    """Its plots are all that it has."""
+    flown = fly(scene_of(ONE, 15.0, "radar2.dropouts=0:15"))
+    assert not any(len(picture.associate.radars.time) for picture in flown.pictures)
 
 
 def test_when_the_position_source_is_lost_the_radars_track_remains() -> None:
