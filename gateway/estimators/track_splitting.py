@@ -39,7 +39,7 @@ class Splitting:
     """What is assumed of targets and sensor, and when tracks begin and end; the budget bounds the time of a scan."""
 
     acceleration_density: tuple[float, ...]  # m^2/s^3, for each axis
-    greatest_speed_mps: float
+    greatest_speed_mps: tuple[float, ...]  # along each axis
     detection: float = 0.9  # of a target, in each look
     survival: float = 0.999  # from look to look
     confirm_at: float = 0.999
@@ -101,19 +101,28 @@ class _Weighed:
 
 
 def scan(
-    bank: Bank, plots: Plots, at: int, sight: Sight, model: Splitting, looked: Bools | None = None
+    bank: Bank, plots: Plots, at: int, sight: Sight, model: Splitting, period_s: float | None = None
 ) -> tuple[Bank, Scan]:
-    """The bank after one look at an instant (ns). `looked` (f,): the families that it could have seen, None = all.
+    """The bank after one look at an instant (ns). What it costs follows the number of pairs of hypothesis and plot.
 
-    Plots need not be of that very instant. What a scan costs follows the number of pairs of hypothesis and plot.
+    Plots need not be of that very instant. `period_s`: what comes is a piece of a scan that takes so long. Then it tells of a
+    family that has a plot in it and was not looked at for half of that, or that was not for one and a half.
     """
     mean, covariance = moved(bank.mean, bank.covariance, (at - bank.at) / SECOND, model.acceleration_density)
-    seen = np.full(len(bank.number), model.detection)
-    if looked is not None:
-        seen *= looked
-    pairs = _paired(mean, covariance, plots, at, sight, seen[bank.family])
-    weighed = _weighed(bank, pairs, seen, len(plots), model)
-    grown = _split(bank, mean, covariance, pairs, weighed, plots.serial, at, model, looked)
+    families = len(bank.number)
+    since_s = (at - bank.looked) / SECOND
+    may = np.ones(families, np.bool_) if period_s is None else since_s >= 0.5 * period_s
+    pairs = _paired(mean, covariance, plots, at, sight, np.where(may, model.detection, 0.0)[bank.family])
+    looked, looked_at = may, np.full(families, at)
+    if period_s is not None:
+        with_plots = np.zeros(families, np.bool_)
+        with_plots[bank.family[pairs.row]] = True
+        overdue = since_s >= 1.5 * period_s
+        looked = with_plots | overdue
+        missed_at = bank.looked + np.where(overdue, round(period_s * SECOND), 0)
+        looked_at = np.where(with_plots, at, missed_at)
+    weighed = _weighed(bank, pairs, np.where(looked, model.detection, 0.0), len(plots), model)
+    grown = _split(bank, mean, covariance, pairs, weighed, plots.serial, at, model, looked, looked_at)
     if weighed.contested:
         grown = distinct(grown)
     grown, left_out = bounded(_with_new(grown, plots, weighed.unexplained, at, sight, model), model.budget)
@@ -152,12 +161,13 @@ def _weighed(bank: Bank, pairs: _Pairs, seen: Floats, plots: int, model: Splitti
     of = bank.family[pairs.row]
     evidence = bank.weight[pairs.row] * pairs.likelihood
     key: Ints = of * max(plots, 1) + pairs.plot
-    edge: Ints | None = None
+    edge: NDArray[np.intp] | None = None
     by_edge = evidence
     if len(bank) != families:  # several hypotheses of a family may have one plot
         key, edge = np.unique(key, return_inverse=True)
-        by_edge = np.bincount(edge, evidence, minlength=len(key))
-    family, plot = np.divmod(key, max(plots, 1))
+        by_edge = np.asarray(np.bincount(edge, evidence, minlength=len(key)))
+    family: Ints = key // max(plots, 1)
+    plot: Ints = key % max(plots, 1)
     before = model.survival * bank.existence
     missed = before * (1.0 - IN_GATE * seen)
     none = 1.0 - before + missed
@@ -179,7 +189,8 @@ def _split(
     serial: Ints,
     at: int,
     model: Splitting,
-    looked: Bools | None,
+    looked: Bools,
+    looked_at: Ints,
 ) -> Bank:
     """The children that are kept: the likeliest of each family that lives on, in order of family and of weight."""
     parents = len(weighed.stays)
@@ -201,9 +212,8 @@ def _split(
     newest = np.zeros((1, len(some)), np.int64)
     newest[0, child] = serial[pairs.plot[pair]]
     path = np.concatenate([newest, bank.path[:-1, parent]])
-    if looked is not None:
+    if not looked.all():
         path = np.where(looked[family[some]], path, bank.path[:, parent])
-    families = len(existence)
     grown = Bank(
         at,
         mean,
@@ -214,10 +224,9 @@ def _split(
         existence,
         bank.first,
         bank.number,
-        bank.looks + (1 if looked is None else looked),
+        bank.looks + looked,
         bank.confirmed | (existence >= model.confirm_at),
-        np.full(families, at) if looked is None else np.where(looked, at, bank.looked),
-        bank.next_number,
+        looked_at,
     )
     return merged(grown)
 
@@ -231,6 +240,6 @@ def _with_new(bank: Bank, plots: Plots, unexplained: Floats, at: int, sight: Sig
     mean = np.concatenate([position, np.zeros_like(position)])
     covariance = np.zeros((2 * axes, 2 * axes, len(new)))
     covariance[:axes, :axes] = scatter
-    covariance[rate, rate] = (0.5 * model.greatest_speed_mps) ** 2
+    covariance[rate, rate] = (0.5 * np.array(model.greatest_speed_mps)[:, None]) ** 2
     existence = unexplained[new] * plots.newborn[new] / (plots.newborn[new] + plots.clutter[new])
     return begun(bank, mean, covariance, plots.serial[new], existence, at)

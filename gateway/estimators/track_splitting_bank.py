@@ -33,11 +33,10 @@ class Bank:
     path: Ints  # (PATH, n) serials of the last plots, newest first, 0 = none in that look
     existence: Floats  # (f,) the track likelihood
     first: Floats  # (f,) that it began with
-    number: Ints  # (f,) never used again
+    number: Ints  # (f,) the serial of the plot that it began with: nothing else ever has that
     looks: Ints  # (f,) since it began, that look included
     confirmed: Bools  # (f,)
     looked: Ints  # (f,) ns, when the sensor last looked there
-    next_number: int = 1
 
     @classmethod
     def empty(cls, at: int, axes: int) -> Bank:
@@ -79,7 +78,6 @@ def chosen(bank: Bank, keep: Bools, weight: Floats) -> Bank:
         bank.looks[alive],
         bank.confirmed[alive],
         bank.looked[alive],
-        bank.next_number,
     )
 
 
@@ -157,9 +155,8 @@ def begun(bank: Bank, mean: Floats, covariance: Floats, serial: Ints, existence:
         np.concatenate([bank.path, path], axis=1),
         np.concatenate([bank.existence, existence]),
         np.concatenate([bank.first, existence]),
-        np.concatenate([bank.number, np.arange(bank.next_number, bank.next_number + count)]),
+        np.concatenate([bank.number, serial]),
         np.concatenate([bank.looks, np.ones(count, np.int64)]),
         np.concatenate([bank.confirmed, np.zeros(count, np.bool_)]),
         np.concatenate([bank.looked, np.full(count, at)]),
-        bank.next_number + count,
     )

@@ -33,7 +33,7 @@ class Printed:
     """The paper's numbers, and those that it leaves open."""
 
     acceleration_density: tuple[float, ...]  # m^2/s^3, for each axis
-    greatest_speed_mps: float  # for the first gate
+    greatest_speed_mps: tuple[float, ...]  # along each axis, for the first gate
     detection: float = 0.9  # PD
     detection_if_false: float = 0.15  # PR
     first_likelihood: float = 0.5
@@ -94,7 +94,7 @@ def begin(plots: Plots, at: int, sight: Sight, model: Printed) -> Tracks:
     rate = np.arange(axes, 2 * axes)
     covariance = np.zeros((2 * axes, 2 * axes, count))
     covariance[:axes, :axes] = scatter
-    covariance[rate, rate] = (0.5 * model.greatest_speed_mps) ** 2
+    covariance[rate, rate] = (0.5 * np.array(model.greatest_speed_mps)[:, None]) ** 2
     likelihood = np.full(count, model.first_likelihood)
     mean = np.concatenate([position, np.zeros_like(position)])
     begun = np.full(count, -1)

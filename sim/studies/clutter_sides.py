@@ -17,7 +17,7 @@ from gateway.estimators.track_splitting_plots import Plane, corrected, moved
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-DENSITY, GREATEST_SPEED_MPS = (1.0, 1.0), 60.0  # m^2/s^3; twice the targets' speed
+DENSITY, GREATEST_SPEED_MPS = (1.0, 1.0), (60.0, 60.0)  # m^2/s^3; twice the targets' speed
 GATE = 13.816  # chi-square of 0.999 with two components
 BEGINS_AFTER, ENDS_AFTER = 7, 3  # scans with plots in a row, scans without: what gives it the least GOSPA in this case
 
@@ -139,7 +139,7 @@ def _begun(known: _Nearest, stays: NDArray[np.bool_], value: Floats, variance: F
     count = value.shape[1]
     covariance = np.zeros((4, 4, count))
     covariance[[0, 1], [0, 1]] = variance
-    covariance[[2, 3], [2, 3]] = (0.5 * GREATEST_SPEED_MPS) ** 2
+    covariance[[2, 3], [2, 3]] = (0.5 * GREATEST_SPEED_MPS[0]) ** 2
     return _Nearest(
         np.concatenate([known.mean[:, stays], np.concatenate([value, np.zeros_like(value)])], axis=1),
         np.concatenate([known.covariance[:, :, stays], covariance], axis=2),

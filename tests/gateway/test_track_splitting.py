@@ -12,7 +12,7 @@ from gateway.estimators.track_splitting_gates import near
 from gateway.estimators.track_splitting_plots import Plane, corrected, moved
 from gateway.estimators.track_splitting_shares import shared
 
-MODEL = Splitting((1.0, 1.0), 60.0)
+MODEL = Splitting((1.0, 1.0), (60.0, 60.0))
 SECOND, SIGMA_M, CLUTTER = 1_000_000_000, 50.0, 0.5e-6
 
 
@@ -54,7 +54,7 @@ def test_the_recursion_has_the_paper_s_unit_values() -> None:
 
 def test_a_family_s_likelihood_is_bayes_rule() -> None:
     """One family and no plot: P (1 - PD PG) / (1 - P + P (1 - PD PG)); one plot in its gate: by the ratio of densities."""
-    model = Splitting((1.0, 1.0), 60.0, survival=1.0, drop_below=1e-6)
+    model = Splitting((1.0, 1.0), (60.0, 60.0), survival=1.0, drop_below=1e-6)
     alone = worked([[[0, 0]], []], model=model, newborn=CLUTTER)
     missed = 1.0 - 0.9 * 0.999
     assert alone.existence == pytest.approx(0.5 * missed / (0.5 + 0.5 * missed))
@@ -200,4 +200,17 @@ def test_no_number_is_given_twice_and_weights_add_up() -> None:
         assert np.bincount(bank.family, bank.weight) == pytest.approx(np.ones(len(bank.number)))
         assert (np.diff(bank.number) > 0).all()
         assert (bank.number[bank.looks == 1] > known).all()
-        known = bank.next_number - 1
+        known = max(known, int(bank.number.max()))
+
+
+def test_a_scan_in_pieces_counts_as_one_look() -> None:
+    """Each scan in four pieces, the target's plot in one of them: it is confirmed, and what is missed is missed once a scan."""
+    bank, looks = Bank.empty(0, 2), []
+    for place in range(40):
+        at_s = 1.5 * place
+        value = [[30.0 * at_s, 0.0]] if place % 4 == 1 and place not in (25, 29) else []
+        bank, _ = scan(bank, plots(value, at_s, 10 * place + 1), round(at_s * SECOND), Plane(), MODEL, 6.0)
+        looks.append(int(bank.looks[0]) if len(bank) else 0)
+    assert bank.confirmed.tolist() == [True]
+    assert looks[-1] == 10
+    assert bank.path[:4, bank.best[0]].tolist() == [371, 331, 0, 0]
