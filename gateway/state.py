@@ -10,6 +10,7 @@ from gateway.associate import Association, Change
 from gateway.frames import RunwayFrame
 from gateway.fuse import Lanes
 from gateway.fuse.consistency import Consistency
+from gateway.predict import Predicting
 from gateway.register import Registration, Remembered
 from gateway.settings import Options, RadarSite, Site
 from gateway.track import RadarTracks
@@ -36,6 +37,7 @@ class State:
     said: frozenset[str] = frozenset()  # what is said once
     reported: frozenset[Change] = frozenset()  # pairs made and lost, lately
     consistency: Consistency = Consistency()  # whether sources scatter as much as the settings say
+    predicting: Predicting = Predicting()  # what aircraft say of their plans, and what is thought of each
 
     def to_remember(self, at: int) -> Remembered | None:
         """What is known of the radars' errors, for the next session of this site; None where nothing is."""
