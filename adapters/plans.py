@@ -20,16 +20,19 @@ from typing import NamedTuple
 from adapters.mavlink_frames import fields
 from gateway.observation import PlanPoint
 
+_PARAMETERS = ("param1", "param2", "param3")
 _ITEM = ("seq", "command", "frame", "x", "y", "z", "target_system", "mission_type", "current")
 MISSION_COUNT, _read_count = fields("MISSION_COUNT", "count", "target_system", "mission_type")
-MISSION_ITEM, _read_item = fields("MISSION_ITEM", *_ITEM)
-MISSION_ITEM_INT, _read_item_int = fields("MISSION_ITEM_INT", *_ITEM)
+MISSION_ITEM, _read_item = fields("MISSION_ITEM", *_ITEM, *_PARAMETERS)
+MISSION_ITEM_INT, _read_item_int = fields("MISSION_ITEM_INT", *_ITEM, *_PARAMETERS)
 MISSION_ACK, _read_ack = fields("MISSION_ACK", "type", "target_system", "mission_type")
 MISSION_CLEAR_ALL, _read_clear = fields("MISSION_CLEAR_ALL", "target_system", "mission_type")
 MISSION_MESSAGES = frozenset((MISSION_COUNT, MISSION_ITEM, MISSION_ITEM_INT, MISSION_ACK, MISSION_CLEAR_ALL))
 
 _KINDS = {16: "waypoint", 82: "waypoint", 22: "take-off", 84: "take-off", 24: "take-off", 21: "landing", 85: "landing"}
 _KINDS |= dict.fromkeys((17, 18, 19, 31), "loiter")
+_LOITER_TURNS = 18
+_RADII = {17: 2, 18: 2, 19: 2, 31: 1}  # which parameter, from 0, is the radius
 _LAST_NAVIGATION, _REGION_OF_INTEREST = 95, 80
 _MSL_FRAMES, _HOME_FRAMES, _TERRAIN_FRAMES = (0, 5), (3, 6), (10, 11)
 _ALL_TYPES = 255
@@ -37,12 +40,19 @@ _HIGHEST_M = 100_000.0
 
 
 def plan_point(
-    sequence: int, command: int, frame: int, latitude_deg: float, longitude_deg: float, altitude_m: float
+    sequence: int,
+    command: int,
+    frame: int,
+    latitude_deg: float,
+    longitude_deg: float,
+    altitude_m: float,
+    parameters: tuple[float, float, float] = (math.nan, math.nan, math.nan),
 ) -> PlanPoint | None:
     """A mission item as a point of a plan; None where it is no place that the vehicle will pass.
 
     `command` and `frame` are MAV_CMD and MAV_FRAME; the altitude is above what the frame says, NaN where it says none, as
-    100 km and more do.
+    100 km and more do. `parameters` are the item's first three: of a point that is flown round the turns, and the radius,
+    positive to the right, 0 = the vehicle's own.
     """
     if command > _LAST_NAVIGATION or command == _REGION_OF_INTEREST or not _is_place(latitude_deg, longitude_deg):
         return None
@@ -56,7 +66,14 @@ def plan_point(
         math.radians(longitude_deg),
         altitude_msl_m=altitude if frame in _MSL_FRAMES else None,
         altitude_above_home_m=altitude if frame in _HOME_FRAMES else None,
+        radius_m=_told(parameters[_RADII[command]], 1.0) if command in _RADII else None,
+        turns=_told(parameters[0], 0.0) if command == _LOITER_TURNS else None,
     )
+
+
+def _told(value: float, least: float) -> float | None:
+    """A parameter that says something: a finite number of at least so much, whichever its sign."""
+    return value if least <= abs(value) <= _HIGHEST_M else None
 
 
 class Overheard(NamedTuple):
@@ -80,11 +97,12 @@ def overheard(message: int, payload: bytes) -> Overheard:
         target, mission = _read_clear(payload)
         return Overheard(target, "" if mission not in (0, _ALL_TYPES) else "clear")
     read = _read_item_int if message == MISSION_ITEM_INT else _read_item
-    sequence, command, frame, x, y, altitude_m, target, mission, current = read(payload)
+    sequence, command, frame, x, y, altitude_m, target, mission, current, *given = read(payload)
     if mission or current > 1:
         return Overheard(target, "")
     place = (x / 1e7, y / 1e7) if message == MISSION_ITEM_INT else (x, y)
-    return Overheard(target, "item", sequence, plan_point(sequence, command, frame, *place, altitude_m))
+    point = plan_point(sequence, command, frame, *place, altitude_m, (given[0], given[1], given[2]))
+    return Overheard(target, "item", sequence, point)
 
 
 @dataclass(slots=True)

@@ -192,7 +192,10 @@ class FlightPlan:
 @made_swiftly
 @dataclass(frozen=True, slots=True)
 class PlanPoint:
-    """One point of a flight plan. The altitude is above mean sea level when `altitude_msl_m`, else above home."""
+    """One point of a flight plan. The altitude is above mean sea level when `altitude_msl_m`, else above home.
+
+    A point of kind "loiter" is flown round at `radius_m`, positive to the right, for at least so many `turns`.
+    """
 
     sequence: int
     kind: str  # "home", "waypoint", "loiter", "take-off", "landing", "other"
@@ -200,6 +203,8 @@ class PlanPoint:
     longitude_rad: float
     altitude_msl_m: float | None = None
     altitude_above_home_m: float | None = None
+    radius_m: float | None = None
+    turns: float | None = None
 
 
 @made_swiftly

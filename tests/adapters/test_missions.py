@@ -140,3 +140,23 @@ def test_an_item_is_a_point_where_it_is_a_place_to_pass(
     point = plan_point(5, command, frame, latitude, 104.0, altitude)
     told = None if point is None else (point.kind, point.altitude_msl_m, point.altitude_above_home_m)
     assert told == expected
+
+
+@pytest.mark.parametrize(
+    ("command", "parameters", "radius_m", "turns"),
+    [
+        (18, (2.0, 0.0, -180.0), -180.0, 2.0),  # so many turns, to the left
+        (17, (0.0, 0.0, 220.0), 220.0, None),
+        (31, (1.0, 90.0, 0.0), 90.0, None),  # until it has its altitude: the radius is the second
+        (18, (1.5, 0.0, 0.0), None, 1.5),  # the vehicle's own radius
+        (16, (3.0, 4.0, 5.0), None, None),
+        (18, (math.nan, 0.0, math.inf), None, None),
+    ],
+)
+def test_a_circle_has_its_radius_and_turns(
+    command: int, parameters: tuple[float, float, float], radius_m: float | None, turns: float | None
+) -> None:
+    """Where a mission item is flown round a point, radius and turns are known where the item says them."""
+    point = plan_point(5, command, 3, 31.0, 104.0, 50.0, parameters)
+    assert point is not None
+    assert (point.radius_m, point.turns) == (radius_m, turns)
