@@ -101,7 +101,7 @@ def test_a_track_keeps_so_many_states_and_no_more(world: Any, monkeypatch: pytes
     said = world.flight(seconds=7.0, gps_period_s=0.1)
     wanted = world.run(said)
     monkeypatch.setattr(lanes, "EVENTS_AT_MOST", 40)
-    monkeypatch.setattr(track, "PLOTS_AT_MOST", 12)
+    monkeypatch.setattr(track.numbered, "PLOTS_AT_MOST", 12)
     runs = [world.run(said, ticks=ticks) for ticks in ("one", "20 ms", "all")]
     for ran in runs:
         assert max(len(lane.events) for lane in ran.state.lanes.lanes.values()) == 40
@@ -125,7 +125,7 @@ def test_more_aircraft_than_are_kept_are_counted(world: Any, monkeypatch: pytest
 
 def test_more_radar_tracks_than_are_kept_are_counted(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Plots of further radar tracks are those of no track."""
-    monkeypatch.setattr(track, "TRACKS_AT_MOST", 2)
+    monkeypatch.setattr(track.numbered, "TRACKS_AT_MOST", 2)
     said = [world.radar_plot(world.Course(), 0.4 * k, number=number) for k in range(4) for number in (1, 2, 3)]
     ran = world.run(said)
     assert len(ran.state.tracks.plots) == 2

@@ -1,4 +1,4 @@
-"""Track: which plots belong together. The radar's own numbers decide; plots without one wait for a later method.
+"""Radar tracks: which plots belong together, by their numbers, be they the radar's own or ours.
 
 A number can be used again for another target: a plot that its predecessor cannot have reached begins a new episode of the
 number, and so does a long silence. A radar track is a (radar, number, episode).
