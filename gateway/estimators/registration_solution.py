@@ -19,8 +19,9 @@ Bools = NDArray[np.bool_]
 
 COMMON_SIGMA_M = 30.0  # prior of the position sources' common error, an axis
 NO_PRIOR_M = 1e5
-# Priors of radars so wide that they only keep the equations solvable, and of their clocks.
-RADAR_SIGMA = np.array([2000.0, 0.1, 0.1, 0.5])
+# Priors of radars so wide that they only keep the equations solvable; and of their clocks, which are off by some frames of a
+# scan, not by seconds: of few flights, all inbound, lateness would else be what is really the position sources' own errors.
+RADAR_SIGMA = np.array([2000.0, 0.1, 0.1, 0.15])
 _OWN_LEAST_M = 1.0
 _OWN_ROUNDS = 12
 _OWN_FREEDOM = 3.0  # the prior of own errors' size weighs as much as one aircraft

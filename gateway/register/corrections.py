@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 APPROACH_S = 15.0  # time constant
 STEP_SIGMAS = 0.5  # of the radar's noise: the largest step
-TIME_STEP_S = 0.005
+TIME_STEP_S = 0.01
 _ARRIVED = 1e-3  # of the largest step: what is nearer is there
 _ALWAYS = -(1 << 62)
 

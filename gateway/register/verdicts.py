@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 SIGNIFICANT = 3.0  # sigmas
-PLAIN = 6.0  # sigmas: an error so large is worth taking off however well it is known
+PLAIN = 6.0  # sigmas: an error so large is worth taking off however well it is known; but for a clock's
 NAMES = ("range", "azimuth", "elevation", "time")
 UNITS = ("m", "degrees", "degrees", "ms")
 LIMITS = (15.0, math.radians(0.05), math.radians(0.05), 0.03)  # a larger sigma than this is worth no correction
@@ -39,8 +39,8 @@ class Verdict:
     @property
     def is_told(self) -> bool:
         """Whether the geometry tells it well enough to be worth a correction."""
-        good_enough = self.sigma <= LIMITS[NAMES.index(self.name)] or self.off_sigmas > PLAIN
-        return self.observable and good_enough
+        is_plain = self.off_sigmas > PLAIN and self.name != "time"
+        return self.observable and (self.sigma <= LIMITS[NAMES.index(self.name)] or is_plain)
 
     @property
     def off_sigmas(self) -> float:
