@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -12,9 +14,13 @@ import typer
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
 from gateway.cli.replay import read_plans
+from gateway.cli.spread import spread
 
 if TYPE_CHECKING:
+    from gateway.runtime.allowed import Allowed
     from gateway.runtime.links import Link
+    from gateway.runtime.manners import Manners
+    from gateway.runtime.setup import Setup
 
 _HELP = """
 Fuse what aircraft and radars say now: align, associate, fuse, predict, draw, archive.
@@ -37,30 +43,9 @@ Examples:
 
 _LINKS, _SENDING, _TRUST = "Links", "What is sent", "Who is believed"
 
-MavlinkOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--mavlink",
-        metavar="URL",
-        help="A MAVLink link; may be given several times. Port 14550 if none is said.",
-        show_default=False,
-        rich_help_panel=_LINKS,
-    ),
-]
-RadarOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--radar",
-        metavar="URL",
-        help="A landing-radar link; may be given several times. Port 30070 if none is said.",
-        show_default=False,
-        rich_help_panel=_LINKS,
-    ),
-]
 SecondsOption = Annotated[
     float | None, typer.Option("--seconds", metavar="S", min=0.0, help="End after so many seconds.", show_default=False)
 ]
-
 PlanOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -70,75 +55,147 @@ PlanOption = Annotated[
         show_default=False,
     ),
 ]
-AllowPeerOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--allow-peer",
-        metavar="ADDRESS",
-        help="Hear only these senders: 10.0.0.5 or 192.168.1.0/24; repeatable.",
-        show_default=False,
-        rich_help_panel=_TRUST,
-    ),
-]
-AllowSystemOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--allow-system",
-        metavar="N",
-        help="Hear only these MAVLink system numbers: 1,2,10-20; repeatable.",
-        show_default=False,
-        rich_help_panel=_TRUST,
-    ),
-]
-HeartbeatOption = Annotated[
-    bool,
-    typer.Option("--heartbeat", help="Send a heartbeat a second, as a ground station does.", rich_help_panel=_SENDING),
-]
-RatesOption = Annotated[
-    bool,
-    typer.Option(
-        "--request-rates", help="Ask vehicles for the messages that do not come often enough.", rich_help_panel=_SENDING
-    ),
-]
-MissionOption = Annotated[
-    bool, typer.Option("--fetch-mission", help="Read each vehicle's mission, once.", rich_help_panel=_SENDING)
-]
-PublishOption = Annotated[
-    str | None,
-    typer.Option(
-        "--publish",
-        metavar="URL",
-        help="Tell the tracks as ADSB_VEHICLE to a ground station or vehicle, such as udpout:127.0.0.1:14551.",
-        show_default=False,
-        rich_help_panel=_SENDING,
-    ),
-]
-PublishSystemOption = Annotated[
-    int,
-    typer.Option(
-        "--publish-system",
-        metavar="N",
-        min=1,
-        max=255,
-        help="As which system's ADS-B receiver; stations show traffic of vehicles that they know.",
-        rich_help_panel=_SENDING,
-    ),
-]
-LeaveOutOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--publish-without",
-        metavar="AIRCRAFT",
-        help="Do not tell of this one, such as mavlink:1: a vehicle that avoids traffic must not be told of itself.",
-        show_default=False,
-        rich_help_panel=_SENDING,
-    ),
-]
+
+
+@dataclass(frozen=True, slots=True)
+class Links:
+    """What is listened to."""
+
+    mavlink: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--mavlink",
+            metavar="URL",
+            help="A MAVLink link; may be given several times. Port 14550 if none is said.",
+            show_default=False,
+            rich_help_panel=_LINKS,
+        ),
+    ] = None
+    radar: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--radar",
+            metavar="URL",
+            help="A landing-radar link; may be given several times. Port 30070 if none is said.",
+            show_default=False,
+            rich_help_panel=_LINKS,
+        ),
+    ] = None
+
+    @contextlib.contextmanager
+    def opened(self) -> Iterator[tuple[list[Link], list[Link]]]:
+        """The links of both kinds, open while the context lasts. Raises UsageError, LinkError."""
+        from gateway.runtime.links import open_link
+        from gateway.runtime.urls import MAVLINK_PORT, RADAR_PORT
+
+        with contextlib.ExitStack() as opened:
+
+            def links(texts: list[str] | None, port: int) -> list[Link]:
+                urls = take.read_urls(texts or [], port)
+                return [opened.enter_context(contextlib.closing(open_link(url))) for url in urls]
+
+            yield links(self.mavlink, MAVLINK_PORT), links(self.radar, RADAR_PORT)
+
+
+@dataclass(frozen=True, slots=True)
+class Trust:
+    """Who is believed."""
+
+    allow_peer: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--allow-peer",
+            metavar="ADDRESS",
+            help="Hear only these senders: 10.0.0.5 or 192.168.1.0/24; repeatable.",
+            show_default=False,
+            rich_help_panel=_TRUST,
+        ),
+    ] = None
+    allow_system: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--allow-system",
+            metavar="N",
+            help="Hear only these MAVLink system numbers: 1,2,10-20; repeatable.",
+            show_default=False,
+            rich_help_panel=_TRUST,
+        ),
+    ] = None
+
+    def allowed(self) -> Allowed:
+        """Who is heard. Raises AllowError."""
+        from gateway.runtime.allowed import parse_allowed
+
+        return parse_allowed(self.allow_peer or (), self.allow_system or ())
+
+
+@dataclass(frozen=True, slots=True)
+class Sending:
+    """What is sent, all of it only if asked for."""
+
+    heartbeat: Annotated[
+        bool,
+        typer.Option(
+            "--heartbeat", help="Send a heartbeat a second, as a ground station does.", rich_help_panel=_SENDING
+        ),
+    ] = False
+    request_rates: Annotated[
+        bool,
+        typer.Option(
+            "--request-rates",
+            help="Ask vehicles for the messages that do not come often enough.",
+            rich_help_panel=_SENDING,
+        ),
+    ] = False
+    fetch_mission: Annotated[
+        bool, typer.Option("--fetch-mission", help="Read each vehicle's mission, once.", rich_help_panel=_SENDING)
+    ] = False
+    publish: Annotated[
+        str | None,
+        typer.Option(
+            "--publish",
+            metavar="URL",
+            help="Tell the tracks as ADSB_VEHICLE to a ground station or vehicle, such as udpout:127.0.0.1:14551.",
+            show_default=False,
+            rich_help_panel=_SENDING,
+        ),
+    ] = None
+    publish_system: Annotated[
+        int,
+        typer.Option(
+            "--publish-system",
+            metavar="N",
+            min=1,
+            max=255,
+            help="As which system's ADS-B receiver; stations show traffic of vehicles that they know.",
+            rich_help_panel=_SENDING,
+        ),
+    ] = 1
+    publish_without: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--publish-without",
+            metavar="AIRCRAFT",
+            help="Do not tell of this one, such as mavlink:1: a vehicle that avoids traffic must not be told of itself.",
+            show_default=False,
+            rich_help_panel=_SENDING,
+        ),
+    ] = None
+
+    def manners(self, key: bytes | None) -> Manners | None:
+        """How to speak on MAVLink links, signed with a key if there is one; None = not at all."""
+        from gateway.runtime.manners import Manners
+
+        if not (self.heartbeat or self.request_rates or self.fetch_mission):
+            return None
+        return Manners(
+            heartbeat=self.heartbeat, request_rates=self.request_rates, fetch_mission=self.fetch_mission, key=key
+        )
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("live", help=_HELP)(live)
+    app.command("live", help=_HELP)(spread(live))
 
 
 def buffer_of(link: Link) -> str:
@@ -148,98 +205,53 @@ def buffer_of(link: Link) -> str:
     return f" The system holds {link.granted_bytes // 1024} KiB for it." if isinstance(link, UdpLink) else ""
 
 
-@contextlib.contextmanager
-def _opened(mavlink: list[str], radar: list[str]) -> Iterator[tuple[list[Link], list[Link]]]:
-    """The links of both kinds, open while the context lasts. Raises UsageError, LinkError."""
-    from gateway.runtime.links import open_link
-    from gateway.runtime.urls import MAVLINK_PORT, RADAR_PORT
-
-    with contextlib.ExitStack() as opened:
-
-        def links(texts: list[str], port: int) -> list[Link]:
-            return [opened.enter_context(contextlib.closing(open_link(url))) for url in take.read_urls(texts, port)]
-
-        yield links(mavlink, MAVLINK_PORT), links(radar, RADAR_PORT)
-
-
 def live(
-    mavlink: MavlinkOption = None,
-    radar: RadarOption = None,
+    links: Links,
     site: take.SiteOption = None,
-    viewer: take.ViewerOption = None,
-    serve: take.ServeOption = None,
-    archive: take.ArchiveOption = None,
+    seen: take.Seen = take.Seen(),
     seconds: SecondsOption = None,
     plan: PlanOption = None,
-    estimator: take.EstimatorOption = take.Estimator.kalman,
-    weighting: take.WeightingOption = take.Weighting.bias,
-    association: take.AssociationOption = take.Association.default,
-    registration: take.RegistrationOption = take.Registration.apply,
+    methods: take.Methods = take.Methods(),
     key: take.KeyOption = None,
-    allow_peer: AllowPeerOption = None,
-    allow_system: AllowSystemOption = None,
-    heartbeat: HeartbeatOption = False,
-    request_rates: RatesOption = False,
-    fetch_mission: MissionOption = False,
-    publish: PublishOption = None,
-    publish_system: PublishSystemOption = 1,
-    publish_without: LeaveOutOption = None,
-    quiet: take.QuietOption = False,
-    json: take.JsonOption = False,
+    trust: Trust = Trust(),
+    sending: Sending = Sending(),
+    telling: take.Telling = take.Telling(),
 ) -> None:
     """Fuse what comes in now."""
-    if not mavlink and not radar:
+    if not links.mavlink and not links.radar:
         raise UsageError("live needs something to listen to: give --mavlink udpin:0.0.0.0:14550, or --radar, or both.")
     from adapters.files import FileError
     from gateway.cli.display import Display
     from gateway.cli.viewing import Viewing, chosen
-    from gateway.runtime.allowed import AllowError, parse_allowed
+    from gateway.runtime.allowed import AllowError
     from gateway.runtime.folder import FolderError
     from gateway.runtime.loop import run_live
-    from gateway.runtime.manners import Manners
-    from gateway.runtime.setup import RunFailure, Setup
+    from gateway.runtime.setup import RunFailure
     from gateway.runtime.signals import StopSignals
     from gateway.runtime.told_plans import told_line
-    from gateway.runtime.urls import MAVLINK_PORT, LinkError
+    from gateway.runtime.urls import LinkError
 
-    place = take.read_place(site)
-    looks = chosen(viewer)
-    signing_key = take.read_signing_key(key)
-    setup = Setup(
-        place=place,
-        options=take.choose(weighting, association, estimator, registration),
-        archive=archive,
-        serve=take.read_serve(serve, looks),
-        publish=take.read_urls([publish], MAVLINK_PORT)[0] if publish else None,
-        publish_system=publish_system,
-        publish_leave_out=frozenset(publish_without or ()),
-        keys=take.read_keys(place, site),
-        signing_key=signing_key,
-        live=True,
-        takes_up=registration is not take.Registration.off,
-        command=tuple(sys.argv[1:]),
-    )
-    speaks = heartbeat or request_rates or fetch_mission
-    manners = Manners(heartbeat=heartbeat, request_rates=request_rates, fetch_mission=fetch_mission, key=signing_key)
+    signing_key, looks = take.read_signing_key(key), chosen(seen.viewer)
+    setup = _setup(site, replace(seen, viewer=looks), methods, sending, signing_key)
     try:
-        allowed = parse_allowed(allow_peer or (), allow_system or ())
+        allowed = trust.allowed()
         told = [told_line(path, vehicle) for vehicle, path in read_plans(plan)]
         with (
-            _opened(mavlink or [], radar or []) as links,
+            links.opened() as opened,
             StopSignals() as stop,
             Viewing(looks) as viewing,
-            Display(viewing, quiet=quiet, as_json=json) as display,
+            Display(viewing, quiet=telling.quiet, as_json=telling.json) as display,
         ):
-            for link in (*links[0], *links[1]):
+            for link in (*opened[0], *opened[1]):
                 display.say(f"Listening on {link.url}.{buffer_of(link)}")
             summary = run_live(
-                *links,
+                *opened,
                 setup,
                 seconds=seconds,
                 watch=display.watch,
                 asked_to_stop=stop,
                 allowed=allowed,
-                manners=manners if speaks else None,
+                manners=sending.manners(signing_key),
                 told=told,
             )
         display.show(summary)
@@ -247,3 +259,27 @@ def live(
         raise UsageError(str(error)) from error
     except RunFailure as failure:
         raise RunError(str(failure)) from failure
+
+
+def _setup(
+    site: Path | None, seen: take.Seen, methods: take.Methods, sending: Sending, signing_key: bytes | None
+) -> Setup:
+    """What a live session is made of. Raises UsageError."""
+    from gateway.runtime.setup import Setup
+    from gateway.runtime.urls import MAVLINK_PORT
+
+    place = take.read_place(site)
+    return Setup(
+        place=place,
+        options=methods.options(),
+        archive=seen.archive,
+        serve=take.read_serve(seen.serve, seen.viewer or take.Viewer.none),
+        publish=take.read_urls([sending.publish], MAVLINK_PORT)[0] if sending.publish else None,
+        publish_system=sending.publish_system,
+        publish_leave_out=frozenset(sending.publish_without or ()),
+        keys=take.read_keys(place, site),
+        signing_key=signing_key,
+        live=True,
+        takes_up=methods.registration is not take.Registration.off,
+        command=tuple(sys.argv[1:]),
+    )

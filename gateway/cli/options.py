@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -125,6 +126,37 @@ KeyOption = Annotated[
 ]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress and no summary; only failures.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the summary as one JSON object.")]
+
+
+@dataclass(frozen=True, slots=True)
+class Methods:
+    """How tracks are made, for a session that begins."""
+
+    estimator: EstimatorOption = Estimator.kalman
+    weighting: WeightingOption = Weighting.bias
+    association: AssociationOption = Association.default
+    registration: RegistrationOption = Registration.apply
+
+    def options(self) -> Options:
+        """The options of a run."""
+        return choose(self.weighting, self.association, self.estimator, self.registration)
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """Where a session is seen, and kept."""
+
+    viewer: ViewerOption = None
+    serve: ServeOption = None
+    archive: ArchiveOption = None
+
+
+@dataclass(frozen=True, slots=True)
+class Telling:
+    """What is told on the terminal."""
+
+    quiet: QuietOption = False
+    json: JsonOption = False
 
 
 def read_place(path: Path | None) -> Place | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,9 +12,11 @@ import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
+from gateway.cli.spread import spread
 
 if TYPE_CHECKING:
     from gateway.runtime.playback import Playback
+    from gateway.runtime.setup import Place, Setup
     from gateway.settings import Options
 
 _HELP = """
@@ -90,28 +92,6 @@ PlanOption = Annotated[
         show_default=False,
     ),
 ]
-EstimatorOption = Annotated[
-    take.Estimator | None,
-    typer.Option("--estimator", help="How tracks move. (default: the session's, else kalman)", show_default=False),
-]
-WeightingOption = Annotated[
-    take.Weighting | None,
-    typer.Option(
-        "--weighting", help="How GPS and radar are weighed. (default: the session's, else bias)", show_default=False
-    ),
-]
-AssociationOption = Annotated[
-    take.Association | None,
-    typer.Option("--association", help="When two are one. (default: the session's, else default)", show_default=False),
-]
-RegistrationOption = Annotated[
-    take.Registration | None,
-    typer.Option(
-        "--registration",
-        help="What radars measure too much: learnt and taken off, only told, or neither. (default: the session's, else apply)",
-        show_default=False,
-    ),
-]
 SmoothOption = Annotated[
     bool,
     typer.Option(
@@ -120,9 +100,53 @@ SmoothOption = Annotated[
 ]
 
 
+@dataclass(frozen=True, slots=True)
+class Section:
+    """Which part of a recording is run, and without which sources."""
+
+    begin: FromOption = None
+    end: ToOption = None
+    mute: MuteOption = None
+
+
+@dataclass(frozen=True, slots=True)
+class Methods:
+    """How tracks are made; None = as in the session."""
+
+    estimator: Annotated[
+        take.Estimator | None,
+        typer.Option("--estimator", help="How tracks move. (default: the session's, else kalman)", show_default=False),
+    ] = None
+    weighting: Annotated[
+        take.Weighting | None,
+        typer.Option(
+            "--weighting", help="How GPS and radar are weighed. (default: the session's, else bias)", show_default=False
+        ),
+    ] = None
+    association: Annotated[
+        take.Association | None,
+        typer.Option(
+            "--association", help="When two are one. (default: the session's, else default)", show_default=False
+        ),
+    ] = None
+    registration: Annotated[
+        take.Registration | None,
+        typer.Option(
+            "--registration",
+            help="What radars measure too much: learnt and taken off, only told, or neither. "
+            "(default: the session's, else apply)",
+            show_default=False,
+        ),
+    ] = None
+
+    def change(self, options: Options) -> Options:
+        """The options with what was asked for in place of what was archived."""
+        return take.change(options, self.weighting, self.association, self.estimator, self.registration)
+
+
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("replay", help=_HELP)(replay)
+    app.command("replay", help=_HELP)(spread(replay))
 
 
 def read_speed(text: str | None, default: float | None) -> float | None:
@@ -177,23 +201,15 @@ def seek(
 
 def replay(
     files: FilesArgument,
-    begin: FromOption = None,
-    end: ToOption = None,
-    mute: MuteOption = None,
+    section: Section = Section(),
     plan: PlanOption = None,
     site: take.SiteOption = None,
     speed: SpeedOption = None,
-    viewer: take.ViewerOption = None,
-    serve: take.ServeOption = None,
-    archive: take.ArchiveOption = None,
-    estimator: EstimatorOption = None,
-    weighting: WeightingOption = None,
-    association: AssociationOption = None,
-    registration: RegistrationOption = None,
+    seen: take.Seen = take.Seen(),
+    methods: Methods = Methods(),
     smooth: SmoothOption = False,
     key: take.KeyOption = None,
-    quiet: take.QuietOption = False,
-    json: take.JsonOption = False,
+    telling: take.Telling = take.Telling(),
 ) -> None:
     """Run recordings again."""
     from adapters.files import FileError
@@ -203,44 +219,37 @@ def replay(
     from gateway.runtime.loop import run_replay
     from gateway.runtime.playback import open_playback
     from gateway.runtime.seeking import SeekError
-    from gateway.runtime.setup import RunFailure, Setup
+    from gateway.runtime.setup import RunFailure
     from gateway.runtime.signals import StopSignals
 
     place, signing_key = take.read_place(site), take.read_signing_key(key)
-    looks = chosen(viewer)
+    looks = chosen(seen.viewer)
     pace = read_speed(speed, None if looks is take.Viewer.none else 1.0)
     try:
         playback = open_playback(files, read_plans(plan), signing_key)
-        found = place or playback.place or playback.find_place()
-        has_own_place = place is not None or playback.place is not None
-        options = take.change(playback.options, weighting, association, estimator, registration)
+        options = methods.change(playback.options)
         if smooth and options.estimator not in SMOOTHED:
             raise UsageError(
                 f"--smooth cannot go back over {options.estimator}, which keeps no covariances that hold together; "
                 f"choose --estimator {', '.join(SMOOTHED[:-1])} or {SMOOTHED[-1]}."
             )
-        playback, options = seek(playback, options, begin, end, mute)
-        setup = Setup(
-            place=found,
+        playback, options = seek(playback, options, section.begin, section.end, section.mute)
+        setup = replace(
+            _setup(playback, place, files[0].stem, seen, looks),
             options=options,
-            archive=archive,
-            serve=take.read_serve(serve, looks),
-            remembered=playback.remembered,
             keys=take.read_keys(place, site),
             signing_key=signing_key,
             is_watched=pace is not None or looks is not take.Viewer.none,
             smooth=smooth,
-            name="" if has_own_place else files[0].stem,
-            command=tuple(sys.argv[1:]),
         )
         with (
             StopSignals() as stop,
             Viewing(looks) as viewing,
-            Display(viewing, quiet=quiet, as_json=json, fraction=playback.fraction) as display,
+            Display(viewing, quiet=telling.quiet, as_json=telling.json, fraction=playback.fraction) as display,
         ):
             for note in playback.notes:
                 display.say(note)
-            if smooth and archive is None:
+            if smooth and seen.archive is None:
                 display.say(
                     "The smoothed tracks are compared with the truth and drawn, where there is one; "
                     "to keep them, name a folder with --archive."
@@ -258,3 +267,19 @@ def replay(
         raise UsageError(str(error)) from error
     except RunFailure as failure:
         raise RunError(str(failure)) from failure
+
+
+def _setup(playback: Playback, place: Place | None, stem: str, seen: take.Seen, looks: take.Viewer) -> Setup:
+    """Where a recording is run again, how it is called, shown and kept. Raises UsageError, FileError."""
+    from gateway.runtime.setup import Setup
+
+    has_own_place = place is not None or playback.place is not None
+    return Setup(
+        place=place or playback.place or playback.find_place(),
+        options=playback.options,
+        archive=seen.archive,
+        serve=take.read_serve(seen.serve, looks),
+        remembered=playback.remembered,
+        name="" if has_own_place else stem,
+        command=tuple(sys.argv[1:]),
+    )

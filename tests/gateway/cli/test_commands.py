@@ -9,7 +9,7 @@ import pytest
 from gateway import __version__
 from gateway.cli.app import check_packages, run
 from gateway.cli.failures import Failure
-from gateway.cli.live import live
+from gateway.cli.live import Links, live
 from gateway.cli.options import Viewer
 from gateway.cli.replay import read_speed
 from gateway.cli.viewing import chosen
@@ -126,4 +126,4 @@ def test_the_viewer_is_a_window_only_where_there_is_a_screen(monkeypatch: pytest
 
 def test_live_without_a_link_is_refused_before_anything_is_opened() -> None:
     with pytest.raises(Failure, match="needs something to listen to"):
-        live()
+        live(Links())
