@@ -24,11 +24,11 @@ SCALED_PRESSURE, _read_pressure = fields("SCALED_PRESSURE", "time_boot_ms", "pre
 WIND, _read_wind = fields("WIND", "direction", "speed", "speed_z")
 WIND_COV, _read_wind_components = fields("WIND_COV", "time_usec", "wind_x", "wind_y", "wind_z")
 
-_FASTEST_MPS = 1000.0
-_STRONGEST_MPS = 150.0
-_LOWEST_M, _HIGHEST_M = -10_000.0, 100_000.0
-_GREATEST_HPA = 2000.0
-_KELVIN_CENTIDEGREES = 27315
+FASTEST_MPS = 1000.0
+STRONGEST_MPS = 150.0
+LOWEST_M, HIGHEST_M = -10_000.0, 100_000.0
+GREATEST_HPA = 2000.0
+KELVIN_CENTIDEGREES = 27315
 
 
 def hud(
@@ -36,10 +36,10 @@ def hud(
 ) -> Observations:
     """VFR_HUD."""
     airspeed, groundspeed, altitude, climb = _read_hud(payload)
-    air = _within(airspeed, 0.0, _FASTEST_MPS, counters)
-    ground = _within(groundspeed, 0.0, _FASTEST_MPS, counters)
-    rate = _within(climb, -_FASTEST_MPS, _FASTEST_MPS, counters)
-    high = _within(altitude, _LOWEST_M, _HIGHEST_M, counters)
+    air = _within(airspeed, 0.0, FASTEST_MPS, counters)
+    ground = _within(groundspeed, 0.0, FASTEST_MPS, counters)
+    rate = _within(climb, -FASTEST_MPS, FASTEST_MPS, counters)
+    high = _within(altitude, LOWEST_M, HIGHEST_M, counters)
     readings = vehicle.readings
     if air is not None:
         readings["airspeed, m/s"] = air
@@ -51,7 +51,7 @@ def hud(
         readings["altitude, m"] = high
     if air is None and ground is None and rate is None and high is None:
         return ()
-    valid_at, _ = moments.at_receipt(component, received_at)
+    valid_at = moments.shown_at_receipt(component, received_at)
     return (AirData(vehicle.name, valid_at, received_at, air, ground, rate, high),)
 
 
@@ -60,9 +60,9 @@ def pressure(
 ) -> Observations:
     """SCALED_PRESSURE."""
     boot_ms, absolute, differential, temperature = _read_pressure(payload)
-    static = _within(absolute, 1e-3, _GREATEST_HPA, counters)
-    pitot = _within(differential, -_GREATEST_HPA, _GREATEST_HPA, counters)
-    valid_at, _ = moments.near(component, boot_ms * 1000, received_at)
+    static = _within(absolute, 1e-3, GREATEST_HPA, counters)
+    pitot = _within(differential, -GREATEST_HPA, GREATEST_HPA, counters)
+    valid_at = moments.shown_near(component, boot_ms * 1000, received_at)
     if static is not None:
         vehicle.readings["static pressure, hPa"] = static
     if pitot is not None:
@@ -75,7 +75,7 @@ def pressure(
             received_at,
             static_pressure_pa=None if static is None else static * 100,
             differential_pressure_pa=None if pitot is None else pitot * 100,
-            temperature_k=(temperature + _KELVIN_CENTIDEGREES) / 100,
+            temperature_k=(temperature + KELVIN_CENTIDEGREES) / 100,
         ),
     )
 
@@ -85,13 +85,13 @@ def wind(
 ) -> Observations:
     """WIND."""
     direction, speed, down = _read_wind(payload)
-    strength = _within(speed, 0.0, _STRONGEST_MPS, counters)
+    strength = _within(speed, 0.0, STRONGEST_MPS, counters)
     bearing = _within(direction, -360.0, 360.0, counters)
-    sink = _within(down, -_STRONGEST_MPS, _STRONGEST_MPS, counters)
+    sink = _within(down, -STRONGEST_MPS, STRONGEST_MPS, counters)
     if strength is None or bearing is None:
         return ()
     angle = math.radians(bearing)
-    valid_at, _ = moments.at_receipt(component, received_at)
+    valid_at = moments.shown_at_receipt(component, received_at)
     towards = (-strength * math.sin(angle), -strength * math.cos(angle))
     return (_wind(vehicle, valid_at, received_at, towards, sink),)
 
@@ -103,12 +103,12 @@ def wind_components(
     usec, north, east, down = _read_wind_components(payload)
     if math.isnan(north) or math.isnan(east):  # not known
         return ()
-    along = _within(north, -_STRONGEST_MPS, _STRONGEST_MPS, counters)
-    across = _within(east, -_STRONGEST_MPS, _STRONGEST_MPS, counters)
-    sink = None if math.isnan(down) else _within(down, -_STRONGEST_MPS, _STRONGEST_MPS, counters)
+    along = _within(north, -STRONGEST_MPS, STRONGEST_MPS, counters)
+    across = _within(east, -STRONGEST_MPS, STRONGEST_MPS, counters)
+    sink = None if math.isnan(down) else _within(down, -STRONGEST_MPS, STRONGEST_MPS, counters)
     if along is None or across is None:
         return ()
-    valid_at, _ = moments.near(component, usec, received_at)
+    valid_at = moments.shown_near(component, usec, received_at)
     return (_wind(vehicle, valid_at, received_at, (across, along), sink),)
 
 
@@ -116,10 +116,15 @@ def _wind(
     vehicle: Vehicle, valid_at: int, received_at: int, towards: tuple[float, float], down: float | None
 ) -> AirData:
     east, north = towards
-    vehicle.readings["wind, m/s"] = math.hypot(east, north)
-    vehicle.readings["wind from, degrees"] = math.degrees(math.atan2(-east, -north)) % 360
+    vehicle.readings |= shown_wind(east, north)
     up = None if down is None else -down
     return AirData(vehicle.name, valid_at, received_at, wind_east_mps=east, wind_north_mps=north, wind_up_mps=up)
+
+
+def shown_wind(east_mps: float, north_mps: float) -> dict[str, float]:
+    """A wind as people are shown it: how strong, and where it comes from."""
+    from_rad = math.atan2(-east_mps, -north_mps)
+    return {"wind, m/s": math.hypot(east_mps, north_mps), "wind from, degrees": math.degrees(from_rad) % 360}
 
 
 def _within(value: float, least: float, greatest: float, counters: Counter[str]) -> float | None:

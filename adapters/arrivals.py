@@ -73,6 +73,13 @@ class Arrivals(Sequence[Arrival]):
         for begin, end in pairwise((*begins, len(places))):
             yield int(ordered[begin]), places[begin:end]
 
+    def at(self, places: Integers) -> Iterator[Arrival]:
+        """Those at some places."""
+        chosen = places.tolist()
+        peers = repeat("") if self.peers is None else map(self.peers.__getitem__, chosen)
+        stamps, sources = self.received_at[places].tolist(), self.source[places].tolist()
+        return map(_made, zip(stamps, sources, map(self.data.__getitem__, chosen), peers, strict=False))
+
     def __len__(self) -> int:
         return len(self.data)
 

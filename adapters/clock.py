@@ -156,6 +156,10 @@ class SourceClock:
             return
         self.utc_offset = offset
 
+    def newest(self) -> tuple[int, int] | None:
+        """The newest time since boot heard, ns, and its stamp; None before the first."""
+        return self._last if self._last_ms >= 0 else None
+
     def boot_at(self, received_at: int) -> int:
         """Time since boot of a frame that carries none: the newest one heard, and the time since then."""
         return self._last[0] + min(max(received_at - self._last[1], 0), SECOND)

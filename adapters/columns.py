@@ -74,11 +74,29 @@ def message_dtype(number: int) -> np.dtype[Any]:
 
     Raises KeyError for an unknown id.
     """
+    body = payload_dtype(number)
+    fields: Mapping[str, Any] = body.fields or {}
+    return np.dtype(
+        {
+            "names": [*_HEAD, *(f"{name}_" if name in _HEAD else name for name in fields)],
+            "formats": [*(FRAME[name] for name in _HEAD), *(one[0] for one in fields.values())],
+            "offsets": [*range(0, 1), *range(8, 13), *(one[1] + _BODY_AT for one in fields.values())],
+            "itemsize": _BODY_AT + body.itemsize,
+        }
+    )
+
+
+@cache
+def payload_dtype(number: int) -> np.dtype[Any]:
+    """The whole payload of a message id, its fields in their declared order. Arrays are subarrays, texts bytes.
+
+    Raises KeyError for an unknown id.
+    """
     message = definitions()[number]
     kinds = dict(zip(message.fieldnames, message.fieldtypes, strict=True))
     formats: dict[str, Any] = {}
     places: dict[str, int] = {}
-    place = _BODY_AT
+    place = 0
     for name, repeats in zip(message.ordered_fieldnames, message.array_lengths, strict=True):
         if kinds[name] == "char":
             formats[name] = np.dtype(f"S{max(repeats, 1)}")
@@ -88,9 +106,9 @@ def message_dtype(number: int) -> np.dtype[Any]:
         places[name], place = place, place + formats[name].itemsize
     return np.dtype(
         {
-            "names": [*_HEAD, *(f"{name}_" if name in _HEAD else name for name in message.fieldnames)],
-            "formats": [*(FRAME[name] for name in _HEAD), *(formats[name] for name in message.fieldnames)],
-            "offsets": [*range(0, 1), *range(8, 13), *(places[name] for name in message.fieldnames)],
+            "names": message.fieldnames,
+            "formats": [formats[name] for name in message.fieldnames],
+            "offsets": [places[name] for name in message.fieldnames],
             "itemsize": place,
         }
     )

@@ -21,13 +21,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-import numpy as np
-
 from adapters import Arrival, Source, told
 from adapters.arrivals import Arrivals
 from adapters.epoch import SessionEpoch
-from adapters.frame_batches import MANY, NO_HEAD, Head, frame_of, heads_of, payload_of, places_of, wanted
-from adapters.gathering import PASSING, Gathered, Said
+from adapters.frame_batches import MANY, NO_HEAD, Head, frame_of, payload_of, wanted
+from adapters.gathering import Said
 from adapters.listening import Listened
 from adapters.mavlink import MavlinkObserver
 from adapters.mavlink_frames import Frame, parse
@@ -36,7 +34,7 @@ from adapters.radar import LandingRadarReceiver, observations
 from adapters.radar import Taken as TakenDatagram
 from adapters.radar_clocks import RadarClocks
 from adapters.signing import advice
-from adapters.unbroken import count_unbroken
+from adapters.together import Together
 from adapters.vehicles import Component
 from adapters.wellbeing import vehicles_health
 from gateway.observation import Heard, Observation
@@ -73,7 +71,6 @@ class Decoder:
         self._epoch = SessionEpoch()
         self._mavlink = MavlinkObserver(self._epoch)
         self._wanted = self._mavlink.wanted
-        self._which, self._passing = wanted(self._wanted), wanted(PASSING)
         self._signing = signing
         self._radar = LandingRadarReceiver(dict(keys or {}), live)
         self._listened: dict[int, Listened] = {}
@@ -81,6 +78,16 @@ class Decoder:
         self._radar_clocks = RadarClocks(self._epoch, self._notes)
         self._plans = told.ToldPlans(self._mavlink.registry)
         self._health: tuple[int, int, Health] | None = None
+        self._together = Together(
+            self._mavlink,
+            self._epoch,
+            self._plans,
+            self._listened,
+            wanted(self._wanted),
+            self._hear_and_judge,
+            self._hear_counted,
+            self._say,
+        )
         for source in sources:
             self.add(source)
 
@@ -106,11 +113,11 @@ class Decoder:
     def hear_many(self, arrivals: Sequence[Arrival]) -> tuple[Said, list[int]]:
         """The same as to hear each of them, in less time: what those said that said anything, and which were refused.
 
-        Of many, what no stage reads (attitudes, inertial samples, air data) comes together, as one Heard for all that was said
-        until something else was, or the second was over.
+        Of many, what no stage reads (attitudes, inertial samples, air data) comes together, as one Heard for each second of
+        stamps, behind what came before its last arrival.
         """
         if len(arrivals) >= MANY and self._signing is None:
-            return self._hear_together(Arrivals.of(arrivals))
+            return self._together.hear_all(Arrivals.of(arrivals))
         said, refused = [], []
         for place, arrival in enumerate(arrivals):
             heard = self.hear(arrival)
@@ -119,40 +126,6 @@ class Decoder:
             if self.refused is not None:
                 refused.append(place)
         return said, refused
-
-    def _hear_together(self, arrivals: Arrivals) -> tuple[Said, list[int]]:
-        heads = heads_of(arrivals.data) if arrivals.heads is None else arrivals.heads
-        components, senders = count_unbroken(arrivals, heads, self._listened)
-        left = np.flatnonzero(places_of(heads, self._which) | (senders < 0))
-        passing = places_of(heads[left], self._passing) & (senders[left] >= 0)
-        gathered, refused = Gathered(self._epoch, self._listened), list[int]()
-        for place, head, sender, passes in zip(
-            left.tolist(), heads[left].tolist(), senders[left].tolist(), passing.tolist(), strict=True
-        ):
-            arrival = arrivals[place]
-            if passes and not self._plans.waits and self._epoch.offset_s is not None:
-                self._gather(gathered, place, arrival, components[sender], head >> 24)
-                continue
-            gathered.close()
-            if sender >= 0:
-                heard = self._hear_counted(arrival, components[sender], head >> 24)
-            else:
-                heard = self.hear(arrival, head)
-                if self.refused is not None:
-                    refused.append(place)
-            if heard is not None:
-                gathered.said.append((place, heard))
-        gathered.close()
-        for number, places in arrivals.by_source():
-            self._listened[number].last_heard = int(arrivals.received_at[places[-1]])
-        return gathered.said, refused
-
-    def _gather(self, gathered: Gathered, place: int, arrival: Arrival, component: Component, message: int) -> None:
-        received_at, number, data, _ = arrival
-        payload, counters = payload_of(data, message), self._listened[number].counters
-        gathered.add(place, number, received_at, self._mavlink.read(component, message, payload, received_at, counters))
-        if self._notes:
-            gathered.close(self._say())
 
     def _hear_counted(self, arrival: Arrival, component: Component, message: int) -> Heard | None:
         """What a good frame says that was counted with those around it."""
@@ -194,6 +167,10 @@ class Decoder:
         if found:
             listened.count(received_at, len(found))
         return Heard(self._epoch.session_time(received_at), found, self._say())
+
+    def _hear_and_judge(self, arrival: Arrival, head: Head) -> tuple[Heard | None, bool]:
+        heard = self.hear(arrival, head)
+        return heard, self.refused is not None
 
     def feed(self, arrival: Arrival) -> Heard:
         """The same, and a Heard also where there is nothing in it."""

@@ -83,6 +83,20 @@ class SessionEpoch:
         """How far a source's clock is behind the session's."""
         return self._lag.get(source, 0) / SECOND
 
+    def added(self, clock: SourceClock, received_at: int) -> int:
+        """What a source's time since boot needs to be the session's time: as `when`, for what is shown and not fused. Such
+        things may be told late and in any order; they leave no trace in the clock.
+        """
+        told = clock if clock.utc_offset is not None else clock.authority()
+        if told.utc_offset is not None and told.key in self._lag:
+            return told.utc_offset
+        return clock.by_envelope(0) + self.session_time(received_at) - received_at
+
+    @property
+    def anchor(self) -> tuple[int, int]:
+        """A stamp and its session time: where it changes, the session's time has leapt, or runs at another speed."""
+        return self._anchor
+
     def when(self, clock: SourceClock, boot_ns: int, received_at: int) -> tuple[int, Timing]:
         """The session's time of a source's time since boot, and how far that can be trusted."""
         told = clock if clock.utc_offset is not None else clock.authority()  # tens of thousands of times a second

@@ -6,12 +6,12 @@ enough to know what was said, and in which order.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 
 from adapters import air, motion
 from adapters.epoch import SessionEpoch
 from adapters.listening import Listened
-from adapters.meters import SECOND
 from gateway.observation import Heard, Observation
 
 Said = list[tuple[int, Heard]]
@@ -27,31 +27,33 @@ PASSING = frozenset(
 
 
 class Gathered:
-    """What arrivals said, in order; what was added in a row, within one second of stamps, is one Heard."""
+    """What arrivals of one second of stamps said, in order; what no stage reads is gathered until `close`."""
 
     def __init__(self, epoch: SessionEpoch, listened: Mapping[int, Listened]) -> None:
         self.said: Said = []
         self._epoch, self._listened = epoch, listened
         self._observations: list[Observation] = []
-        self._counts: dict[int, int] = {}  # of observations, by source
+        self._counts = Counter[int]()  # of observations, by source
         self._place = self._received_at = 0
-        self._until = 0  # the stamp at which the second is over
 
-    def add(self, place: int, number: int, received_at: int, found: tuple[Observation, ...]) -> None:
+    def add(self, place: int, number: int, received_at: int, found: Sequence[Observation]) -> None:
         """What an arrival of a source said that no stage reads."""
-        if received_at >= self._until:
-            self.close()
-            self._until = (received_at // SECOND + 1) * SECOND
-        self._place, self._received_at = place, received_at
+        self.add_all(place, received_at, found, {number: len(found)})
+
+    def add_all(self, place: int, received_at: int, found: Sequence[Observation], counts: Mapping[int, int]) -> None:
+        """What several said, the last of which was at this place; `counts`: how much by source."""
+        self._place, self._received_at = max(self._place, place), max(self._received_at, received_at)
         self._observations += found
-        self._counts[number] = self._counts.get(number, 0) + len(found)
+        self._counts.update(counts)
 
     def close(self, notes: tuple[tuple[str, str], ...] = ()) -> None:
-        """What was added since the last time is complete. To be called before anything sets the session's clock."""
+        """What was added since the last time is complete."""
         if not self._observations and not notes:
             return
         now = self._epoch.session_time(self._received_at)
+        if self.said:  # it comes behind what was said since, and what is heard never goes back
+            now = max(now, self.said[-1][1].now)
         self.said.append((self._place, Heard(now, tuple(self._observations), notes)))
         for number, count in self._counts.items():
             self._listened[number].count(self._received_at, count)
-        self._observations, self._counts = [], {}
+        self._observations, self._counts = [], Counter()

@@ -107,8 +107,17 @@ class MavlinkObserver:
         self, component: Component, message: int, payload: bytes, received_at: int, counters: Counter[str]
     ) -> Observations:
         """What a good frame of a component says, apart from its sequence number. Never raises."""
-        if message in _ROLES:
-            component.take_role(*_ROLES[message](payload)[:2])
+        if message not in _ROLES:
+            return self._read(component, message, payload, received_at, counters)
+        before = component.told_by
+        component.take_role(*_ROLES[message](payload)[:2])
+        found = self._read(component, message, payload, received_at, counters)
+        self.registry.version += component.told_by != before
+        return found
+
+    def _read(
+        self, component: Component, message: int, payload: bytes, received_at: int, counters: Counter[str]
+    ) -> Observations:
         if component.is_vehicle:
             reader = _READERS.get(message)
             if reader is not None:

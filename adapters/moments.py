@@ -21,10 +21,10 @@ from gateway.observation import Observation, Timing
 Observations = tuple[Observation, ...]
 When = tuple[int, Timing]
 
-_LEAST_UNIX_USEC = 10**15
+LEAST_UNIX_USEC = 10**15
 _GREATEST_UNIX_USEC = 7_258_118_400 * 10**6  # 2200
-_WRAP_NS = (1 << 32) * 10**6
-_STRAY_NS = 10 * SECOND  # a time this far from the component's newest is not of this boot
+WRAP_NS = (1 << 32) * 10**6
+STRAY_NS = 10 * SECOND  # a time this far from the component's newest is not of this boot
 _SETTLED_NS = 15 * SECOND
 _FOREIGN_AT_MOST = 256  # names; of drones anybody can make up any number
 
@@ -71,36 +71,43 @@ class Moments:
             return self.epoch.session_time(received_at), Timing.PROVISIONAL
         return self.epoch.when(clock, clock.boot_at(received_at), received_at)
 
-    def near(self, component: Component, usec: int, received_at: int) -> When:
-        """When a time_usec was that is not to set the source's clock; the time of receipt where it is of another clock."""
+    def shown_at_receipt(self, component: Component, received_at: int) -> int:
+        """The same for what is shown and not fused: it leaves no trace."""
+        clock = component.clock
+        if not clock.has_been_heard():
+            return self.epoch.session_time(received_at)
+        return clock.boot_at(received_at) + self.epoch.added(clock, received_at)
+
+    def shown_near(self, component: Component, usec: int, received_at: int) -> int:
+        """When a time_usec was of something that is shown and not fused; its receipt where that is a time of another clock."""
         boot_ns = self.since_boot(component, usec, received_at)
         if boot_ns is None:
-            return self.at_receipt(component, received_at)
-        return self.epoch.when(component.clock, boot_ns, received_at)
+            return self.shown_at_receipt(component, received_at)
+        return boot_ns + self.epoch.added(component.clock, received_at)
 
     def since_boot(self, component: Component, usec: int, received_at: int) -> int | None:
         """A time_usec as time since boot, ns; None where it is UTC, or further than 10 s from the component's newest."""
         clock = component.clock
-        if usec >= _LEAST_UNIX_USEC or not clock.has_been_heard():
+        if usec >= LEAST_UNIX_USEC or not clock.has_been_heard():
             return None
         boot_ns, newest = usec * 1000, clock.boot_at(received_at)
-        if abs(boot_ns - newest) <= _STRAY_NS:
+        if abs(boot_ns - newest) <= STRAY_NS:
             return boot_ns
-        apart = (boot_ns - newest + _WRAP_NS // 2) % _WRAP_NS - _WRAP_NS // 2  # one of them has wrapped
-        return newest + apart if abs(apart) <= _STRAY_NS else None
+        apart = (boot_ns - newest + WRAP_NS // 2) % WRAP_NS - WRAP_NS // 2  # one of them has wrapped
+        return newest + apart if abs(apart) <= STRAY_NS else None
 
     def told(
         self, component: Component, vehicle: Vehicle, usec: int, received_at: int, counters: Counter[str]
     ) -> When | None:
         """When a time_usec was that also sets the source's clock; None (counted) while that is unsure."""
-        if usec >= _LEAST_UNIX_USEC:
+        if usec >= LEAST_UNIX_USEC:
             return self.unix(component, vehicle.name, usec, received_at)
         boot_ns = self.boot(component, vehicle, usec // 1000 & 0xFFFFFFFF, received_at, counters)
         return None if boot_ns is None else self.when(component, boot_ns + usec % 1000 * 1000, received_at)
 
     def unix(self, component: Component, name: str, usec: int, received_at: int) -> When:
         """When a UTC that a message tells was, in the session; the time of receipt as long as that cannot be told."""
-        if not _LEAST_UNIX_USEC <= usec < _GREATEST_UNIX_USEC:
+        if not LEAST_UNIX_USEC <= usec < _GREATEST_UNIX_USEC:
             return self.at_receipt(component, received_at)
         key = (*component.key, "UTC")
         speed = self._unix_speeds.setdefault(key, SpeedMeter())

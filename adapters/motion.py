@@ -19,7 +19,7 @@ from collections.abc import Callable
 from typing import Any
 
 from adapters.mavlink_frames import fields
-from adapters.moments import Moments, Observations, Reader, When
+from adapters.moments import Moments, Observations, Reader
 from adapters.roles import ARDUPILOT
 from adapters.vehicle import Vehicle
 from adapters.vehicles import Component
@@ -28,17 +28,17 @@ from gateway.observation import AirData, Attitude, ImuSample, Observation
 ATTITUDE, _read_attitude = fields("ATTITUDE", "time_boot_ms", "roll", "pitch", "yaw")
 _OFFSET = tuple(f"repr_offset_q[{index}]" for index in range(4))
 ATTITUDE_QUATERNION, _read_quaternion = fields("ATTITUDE_QUATERNION", "time_boot_ms", "q1", "q2", "q3", "q4", *_OFFSET)
-_AXES = ("xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro", "xmag", "ymag", "zmag")
-RAW_IMU, _read_raw = fields("RAW_IMU", *_AXES, "time_usec", "id")
-SCALED_IMU, _read_scaled = fields("SCALED_IMU", *_AXES, "time_boot_ms")
-SCALED_IMU2, _read_scaled_2 = fields("SCALED_IMU2", *_AXES, "time_boot_ms")
-SCALED_IMU3, _read_scaled_3 = fields("SCALED_IMU3", *_AXES, "time_boot_ms")
+AXES = ("xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro", "xmag", "ymag", "zmag")
+RAW_IMU, _read_raw = fields("RAW_IMU", *AXES, "time_usec", "id")
+SCALED_IMU, _read_scaled = fields("SCALED_IMU", *AXES, "time_boot_ms")
+SCALED_IMU2, _read_scaled_2 = fields("SCALED_IMU2", *AXES, "time_boot_ms")
+SCALED_IMU3, _read_scaled_3 = fields("SCALED_IMU3", *AXES, "time_boot_ms")
 HIGHRES_IMU, _read_highres = fields(
-    "HIGHRES_IMU", *_AXES, "time_usec", "id", "fields_updated", "abs_pressure", "diff_pressure"
+    "HIGHRES_IMU", *AXES, "time_usec", "id", "fields_updated", "abs_pressure", "diff_pressure"
 )
 
-_MILLI_G = 9.80665e-3
-_CUT_OFF = 32767
+MILLI_G = 9.80665e-3
+CUT_OFF = 32767
 _ACCELERATION, _RATE, _FIELD, _ABSOLUTE, _DIFFERENTIAL = 0x7, 0x38, 0x1C0, 0x200, 0x400
 _GREATEST = 1e6  # no sensor's acceleration, rate or field
 
@@ -128,8 +128,8 @@ def raw_imu(
         counters["raw units unknown"] += 1
         return ()
     *axes, usec, number = _read_raw(payload)
-    when = moments.near(component, usec, received_at)
-    return _scaled(vehicle, number + 1, axes, when, received_at, counters)
+    valid_at = moments.shown_near(component, usec, received_at)
+    return _scaled(vehicle, number + 1, axes, valid_at, received_at, counters)
 
 
 def _scaled_sensor(read: Callable[[bytes], tuple[Any, ...]], sensor: int) -> Reader:
@@ -144,8 +144,8 @@ def _scaled_sensor(read: Callable[[bytes], tuple[Any, ...]], sensor: int) -> Rea
         counters: Counter[str],
     ) -> Observations:
         *axes, boot_ms = read(payload)
-        when = moments.near(component, boot_ms * 1000, received_at)
-        return _scaled(vehicle, sensor, axes, when, received_at, counters)
+        valid_at = moments.shown_near(component, boot_ms * 1000, received_at)
+        return _scaled(vehicle, sensor, axes, valid_at, received_at, counters)
 
     return hear
 
@@ -160,14 +160,14 @@ def highres_imu(
 ) -> Observations:
     """HIGHRES_IMU: what it says was updated."""
     *axes, usec, number, updated, absolute, differential = _read_highres(payload)
-    when = moments.near(component, usec, received_at)
+    valid_at = moments.shown_near(component, usec, received_at)
     vectors = [
         _vector(axes[first : first + 3], counters) if updated & bits == bits else None
         for first, bits in ((0, _ACCELERATION), (3, _RATE), (6, _FIELD))
     ]
     found: list[Observation] = []
     if any(one is not None for one in vectors):
-        found.append(_sample(vehicle, number + 1, vectors, when, received_at))
+        found.append(_sample(vehicle, number + 1, vectors, valid_at, received_at))
     pressures = (absolute if updated & _ABSOLUTE else math.nan, differential if updated & _DIFFERENTIAL else math.nan)
     static, pitot = (None if not math.isfinite(one) else one * 100 for one in pressures)
     if static is not None and static <= 0:
@@ -176,7 +176,7 @@ def highres_imu(
     if static is not None:
         vehicle.readings["static pressure, hPa"] = static / 100
     if static is not None or pitot is not None:
-        air = AirData(vehicle.name, when[0], received_at, static_pressure_pa=static, differential_pressure_pa=pitot)
+        air = AirData(vehicle.name, valid_at, received_at, static_pressure_pa=static, differential_pressure_pa=pitot)
         found.append(air)
     return tuple(found)
 
@@ -190,16 +190,16 @@ def _vector(axes: list[float], counters: Counter[str]) -> Vector | None:
 
 
 def _scaled(
-    vehicle: Vehicle, sensor: int, axes: list[int], when: When, received_at: int, counters: Counter[str]
+    vehicle: Vehicle, sensor: int, axes: list[int], valid_at: int, received_at: int, counters: Counter[str]
 ) -> Observations:
     """A sample in mG, mrad/s and mgauss."""
     ax, ay, az, gx, gy, gz, mx, my, mz = axes
-    acceleration: Vector | None = (ax * _MILLI_G, ay * _MILLI_G, az * _MILLI_G)
+    acceleration: Vector | None = (ax * MILLI_G, ay * MILLI_G, az * MILLI_G)
     rate: Vector | None = (gx / 1000, gy / 1000, gz / 1000)
     magnetic: Vector | None = (mx / 1000, my / 1000, mz / 1000)
-    if max(axes) >= _CUT_OFF or min(axes) <= -_CUT_OFF:
+    if max(axes) >= CUT_OFF or min(axes) <= -CUT_OFF:
         counters["inertial out of range"] += 1
-        cut = [max(map(abs, axes[first : first + 3])) >= _CUT_OFF for first in (0, 3, 6)]
+        cut = [max(map(abs, axes[first : first + 3])) >= CUT_OFF for first in (0, 3, 6)]
         acceleration, rate, magnetic = (
             None if is_cut else told for is_cut, told in zip(cut, (acceleration, rate, magnetic), strict=True)
         )
@@ -210,21 +210,19 @@ def _scaled(
     if acceleration is None and rate is None and magnetic is None:
         counters["inertial unit without data"] += 1
         return ()
-    return (_sample(vehicle, sensor, [acceleration, rate, magnetic], when, received_at),)
+    return (_sample(vehicle, sensor, [acceleration, rate, magnetic], valid_at, received_at),)
 
 
-def _sample(vehicle: Vehicle, sensor: int, vectors: list[Vector | None], when: When, received_at: int) -> ImuSample:
+def _sample(vehicle: Vehicle, sensor: int, vectors: list[Vector | None], valid_at: int, received_at: int) -> ImuSample:
     acceleration, rate, magnetic = vectors
-    latest = vehicle.inertial.get(sensor)
-    if latest is None:
-        latest = vehicle.inertial[sensor] = [None, None, None]
+    latest = vehicle.inertial
     if acceleration is not None:
-        latest[0] = acceleration
+        latest[sensor, 0] = acceleration
     if rate is not None:
-        latest[1] = rate
+        latest[sensor, 1] = rate
     if magnetic is not None:
-        latest[2] = magnetic
-    return ImuSample(vehicle.name, when[0], received_at, sensor, acceleration, rate, magnetic)
+        latest[sensor, 2] = magnetic
+    return ImuSample(vehicle.name, valid_at, received_at, sensor, acceleration, rate, magnetic)
 
 
 def readings(vehicle: Vehicle) -> dict[str, float]:
@@ -233,7 +231,6 @@ def readings(vehicle: Vehicle) -> dict[str, float]:
     if vehicle.attitude_rad is not None:
         roll, pitch, yaw = map(math.degrees, vehicle.attitude_rad)
         shown = {"roll, degrees": roll, "pitch, degrees": pitch, "heading, degrees": yaw % 360.0}
-    for sensor, latest in vehicle.inertial.items():
-        names = _NAMES[min(sensor, len(_NAMES)) - 1]
-        shown |= {name: math.hypot(*vector) for name, vector in zip(names, latest, strict=True) if vector is not None}
+    for (sensor, which), vector in sorted(vehicle.inertial.items()):
+        shown[_NAMES[min(sensor, len(_NAMES)) - 1][which]] = math.hypot(*vector)
     return shown

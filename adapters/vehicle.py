@@ -29,7 +29,7 @@ class Vehicle:
     status: VehicleStatus | None = None  # what its last heartbeat said
     last_attitude: int = -1  # time since boot, ns
     attitude_rad: tuple[float, float, float] | None = None  # what it last said, for people
-    inertial: dict[int, list[tuple[float, float, float] | None]] = field(default_factory=dict)  # likewise, by sensor
+    inertial: dict[tuple[int, int], tuple[float, float, float]] = field(default_factory=dict)  # likewise, by sensor
     readings: dict[str, float] = field(default_factory=dict)  # what it last said, for people: "airspeed, m/s": 21.3
     words: dict[str, str] = field(default_factory=dict)  # and in words: "landed": "on ground"
     told: dict[tuple[int, int, bytes], int] = field(default_factory=dict)  # (component, message, time): its source

@@ -14,6 +14,7 @@ from one link, for each kind of message the one that is the least delayed: else 
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from struct import Struct
 
@@ -50,6 +51,20 @@ class Component:
     linked_to: Vehicle | None = None  # whose other links' clocks this one knows
     member: _Member | None = None
 
+    @property
+    def only_of(self) -> Vehicle | None:
+        """The vehicle that it is part of, where no other link carries that one, and none may: nothing is compared then."""
+        member = self.member
+        if not self.is_vehicle or member is None or member.trace is not None or member.vehicle is None:
+            return None
+        return member.vehicle if len(member.vehicle.sources) == 1 else None
+
+    @property
+    def told_by(self) -> tuple[bool, int | None]:
+        """What decides how its messages are read: whether it is a vehicle's, and of which autopilot."""
+        vehicle = None if self.member is None else self.member.vehicle
+        return self.is_vehicle, None if vehicle is None or vehicle.status is None else vehicle.status.autopilot
+
     def take_role(self, kind: int, autopilot: int) -> None:
         """What a HEARTBEAT says that this component is; it may change."""
         self.is_vehicle = is_vehicle(kind, autopilot)
@@ -75,6 +90,8 @@ class Registry:
     origins: dict[int, str]
     notes: list[tuple[str, str]]
     components: dict[tuple[int, int, int], Component] = field(default_factory=dict)
+    version: int = 0  # another one wherever it may have changed what a component is, or whose
+    catch_up: Callable[[], None] | None = None  # asked for before it matters when vehicles were heard last
     _is_full: bool = False
     _siblings: dict[tuple[int, int], Siblings] = field(default_factory=dict)
     _members: dict[int, dict[int, _Member]] = field(default_factory=dict)  # by system, then by source
@@ -145,6 +162,7 @@ class Registry:
 
     def _follow(self, members: dict[int, _Member], received_at: int) -> None:
         """Follow the motion of those that are, or may be, one vehicle over several sources, and of no others."""
+        self.version += 1
         open_question = len(members) > 1 and any(member.vehicle is None for member in members.values())
         for member in members.values():
             shared = member.vehicle is not None and len(member.vehicle.sources) > 1
@@ -179,6 +197,8 @@ class Registry:
         known = self._vehicles.get(member.system)
         if not known:
             return self._new(member.system, counters)
+        if self.catch_up is not None:
+            self.catch_up()
         alive = [vehicle for vehicle in known if received_at - vehicle.last_heard < _ALIVE_NS]
         if not alive:
             return max(known, key=lambda vehicle: vehicle.last_heard)

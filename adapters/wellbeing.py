@@ -72,7 +72,7 @@ def _vehicle(
         (told if timing in (Timing.UTC, Timing.FOREIGN) else clock).sigma_s() if settled else math.nan,
         delay_s,
         delay_99_s,
-        (*motion.readings(vehicle).items(), *vehicle.readings.items(), *_rates(own, received_at)),
+        (*motion.readings(vehicle).items(), *sorted(vehicle.readings.items()), *_rates(own, received_at)),
         tuple(words.items()),
     )
 

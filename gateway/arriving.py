@@ -31,16 +31,15 @@ class Arriving(Making):
                 staged = True
             elif isinstance(observation, FORETELLING):
                 self.predicting = self.predicting.hearing(observation)
-        if staged:
-            return True
-        self.serial += len(arrival.observations)
-        return False
+        return staged
 
     def align(self, arrival: Heard) -> tuple[list[Fix], list[Plot]]:
         """The arrival's reports and plots in the site's frames; those whose time cannot be used are counted."""
         fixes, plots = [], []
         for observation in arrival.observations:
-            self.serial += 1
+            self.serial += isinstance(
+                observation, STAGED
+            )  # what passes by comes in pieces as ticks fall: no number hangs on it
             if isinstance(observation, GpsReport):
                 fix, geoid = next(self._placed)
                 if geoid is not self.geoid and geoid.separation_m != self.geoid.separation_m:
@@ -66,7 +65,7 @@ class Arriving(Making):
         serial, serials = self.serial, []
         for arrival in heard:
             for report in arrival.observations:
-                serial += 1
+                serial += isinstance(report, STAGED)
                 if isinstance(report, GpsReport):
                     geoid = geoid.learn(report)
                     reports.append(report)
@@ -92,6 +91,8 @@ class Arriving(Making):
     def _take_status(self, status: RadarStatus) -> None:
         """A radar's word of where it stands: used where the site file has none, compared with it otherwise."""
         said, known = align.radar_from_status(status, self.frame), self.radars.get(status.radar)
+        if known is not None or len(self.radars) < RADARS_AT_MOST:
+            self.unnumbered = self.unnumbered.scanning(status.radar, status.update_period_s)
         if known is None and len(self.radars) >= RADARS_AT_MOST:
             self.count("status of more radars than are kept")
         elif known is None:

@@ -6,9 +6,13 @@ Every observation has `valid_at` (when it was so, by its source's clock) and `re
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, make_dataclass
 from enum import Enum
 from typing import Any, TypeVar, cast
+
+from numpy.typing import NDArray
 
 _Made = TypeVar("_Made")
 
@@ -241,9 +245,51 @@ class Truth:
     mode: str | None = None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Many:
+    """Observations of one kind in columns, where tens of thousands a second come that no stage reads.
+
+    Read one by one they are what they are. `columns`: by field, an element for each, and three for a vector; NaN = not
+    measured; a field that none of them has is left out.
+    """
+
+    kind: type[ImuSample | AirData]
+    columns: Mapping[str, NDArray[Any]]
+
+    def __len__(self) -> int:
+        return len(self.columns["valid_at"])
+
+    def __iter__(self) -> Iterator[ImuSample | AirData]:
+        told = [map(_told, column.tolist()) for column in self.columns.values()]
+        for values in zip(*told, strict=True):
+            yield self.kind(**dict(zip(self.columns, values, strict=True)))
+
+
+def _told(value: Any) -> Any:
+    """A value of a column as an observation holds it."""
+    if isinstance(value, list):
+        return None if math.isnan(value[0]) else tuple(value)
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
 Observation = (
-    GpsReport | RadarPlot | RadarStatus | Attitude | ImuSample | AirData | VehicleStatus | FlightPlan | Intent | Truth
+    GpsReport
+    | RadarPlot
+    | RadarStatus
+    | Attitude
+    | ImuSample
+    | AirData
+    | VehicleStatus
+    | FlightPlan
+    | Intent
+    | Truth
+    | Many
 )
+
+
+def how_many(observation: Observation) -> int:
+    """How many observations it is."""
+    return len(observation) if isinstance(observation, Many) else 1
 
 
 @made_swiftly

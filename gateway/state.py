@@ -13,7 +13,7 @@ from gateway.fuse.consistency import Consistency
 from gateway.predict import Predicting
 from gateway.register import Registration, Remembered
 from gateway.settings import Options, RadarSite, Site
-from gateway.track import RadarTracks
+from gateway.track import RadarTracks, Unnumbered
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,13 +31,14 @@ class State:
     lanes: Lanes = Lanes()
     now: int | None = None  # session time of the newest arrival or watermark
     instant: int = 0  # the next whole second
-    serial: int = 0  # observations so far
+    serial: int = 0  # observations so far that a stage reads
     steps: int = 0
     counters: Mapping[str, int] = field(default_factory=dict)
     said: frozenset[str] = frozenset()  # what is said once
     reported: frozenset[Change] = frozenset()  # pairs made and lost, lately
     consistency: Consistency = Consistency()  # whether sources scatter as much as the settings say
     predicting: Predicting = Predicting()  # what aircraft say of their plans, and what is thought of each
+    unnumbered: Unnumbered = Unnumbered()  # plots without a number, and what they are thought to be
 
     def to_remember(self, at: int) -> Remembered | None:
         """What is known of the radars' errors, for the next session of this site; None where nothing is."""

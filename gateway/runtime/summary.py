@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from gateway.observation import Many, how_many
 from gateway.picture import Picture, SourceHealth
 from gateway.runtime.accuracy import Accuracy, Score, SmoothedScore
 from gateway.settings import Runway
@@ -81,7 +82,9 @@ class Tally:
 
     def add(self, picture: Picture) -> None:
         """Count one picture."""
-        self.observations.update(type(observation).__name__ for observation in picture.observations)
+        for observation in picture.observations:
+            kind = observation.kind if isinstance(observation, Many) else type(observation)
+            self.observations[kind.__name__] += how_many(observation)
         self.traffic += sum(not name.startswith("mavlink:") for name in picture.align.report_aircraft)
         self.tracks = max(self.tracks, int(picture.fuse.track.max(initial=0)))
         if len(self.aircraft) < _NAMED_AT_MOST:

@@ -16,7 +16,7 @@ from adapters.decode import Decoder
 from adapters.mavlink_frames import Frame, fields, message_name, parse
 from adapters.roles import by_heartbeat, by_number
 from adapters.sequences import SequenceCheck, Siblings
-from gateway.observation import FlightPlan, GpsReport, Observation, RadarPlot, RadarStatus, Timing
+from gateway.observation import FlightPlan, GpsReport, Many, Observation, RadarPlot, RadarStatus, Timing
 from gateway.picture import Health, VehicleHealth
 from gateway.runtime.places import PlaceFinder
 from gateway.runtime.playback import Playback
@@ -194,6 +194,10 @@ def _count(found: Survey, source: Source, arrival: Arrival) -> None:
 
 
 def _see(found: Survey, observation: Observation) -> None:
+    if isinstance(observation, Many):
+        for one in observation:
+            _see(found, one)
+        return
     kind = type(observation).__name__
     found.observations[kind] += 1
     if isinstance(observation, RadarPlot | RadarStatus):

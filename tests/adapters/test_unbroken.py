@@ -1,53 +1,83 @@
 """Frames that are counted many at once are counted, and heard, as each by itself."""
 
+import math
 import random
 from collections import Counter
 
+import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from adapters import Arrival, Source
+from adapters import Arrival, Source, waiting
 from adapters.decode import Decoder
 from adapters.mavlink_frames import encode
 from adapters.sequences import SequenceCheck, Siblings
-from gateway.observation import Attitude, Heard
+from gateway.observation import AirData, Attitude, Heard, ImuSample, Many
 
 SECOND = 10**9
 T0 = 1_790_000_000 * SECOND
 LINKS = [Source(0, "mavlink", "north", "udpin:0"), Source(1, "mavlink", "south", "udpin:1")]
-SENDERS = ((0, 1, 1), (0, 1, 1), (0, 1, 154), (0, 2, 1), (1, 1, 1), (1, 3, 190))  # source, system, component
-MESSAGES = {
-    "HEARTBEAT": {
-        "type": 2,
-        "autopilot": 3,
-        "base_mode": 129,
-        "custom_mode": 4,
-        "system_status": 4,
-        "mavlink_version": 3,
-    },
-    "ATTITUDE": dict.fromkeys(("time_boot_ms", "roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"), 0),
-    "SYSTEM_TIME": {"time_boot_ms": 0, "time_unix_usec": 0},
-    "MEMINFO": {"brkval": 1, "freemem": 2},
-    "VIBRATION": {"time_usec": 1, "vibration_x": 0, "vibration_y": 0, "vibration_z": 0}
-    | {f"clipping_{n}": 0 for n in range(3)},
+SENDERS = (  # source, system, component
+    *((0, 1, 1), (0, 1, 1), (0, 1, 154), (1, 1, 1), (1, 3, 190)),
+    *((0, 2, 1), (0, 2, 1), (0, 2, 1), (0, 4, 1), (0, 4, 1), (1, 5, 1)),
+)
+NO, HUGE = math.nan, 1e9
+AXES = ("xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro", "xmag", "ymag", "zmag")
+HEARTBEAT = {"type": 2, "autopilot": 3, "base_mode": 129, "custom_mode": 4, "system_status": 4, "mavlink_version": 3}
+VALUES: dict[str, dict[str, tuple[float, ...]]] = {
+    "HEARTBEAT": {name: (value,) for name, value in HEARTBEAT.items()},
+    "ATTITUDE": dict.fromkeys(("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"), (0.0, 0.25)),
+    "SYSTEM_TIME": {},
+    "MEMINFO": {"brkval": (1,), "freemem": (2,)},
+    "VIBRATION": dict.fromkeys(
+        ("vibration_x", "vibration_y", "vibration_z", *(f"clipping_{n}" for n in range(3))), (0,)
+    ),
+    "RAW_IMU": dict.fromkeys(AXES, (0, 7, -1000, 7, 32767)) | {"id": (0, 0, 2, 255), "temperature": (0,)},
+    "SCALED_IMU": dict.fromkeys(AXES, (0, 0, 0, -980)),
+    "SCALED_IMU2": dict.fromkeys(AXES, (250, -32768, 1, 7)),
+    "VFR_HUD": dict.fromkeys(("airspeed", "groundspeed", "alt", "climb"), (1.5, -2.5, NO, HUGE, NO, 33.3))
+    | {"heading": (0,), "throttle": (0,)},
+    "SCALED_PRESSURE": {"press_abs": (945.3, 0.0, NO), "press_diff": (1.1, -HUGE), "temperature": (-1, 2000)},
+    "WIND": {"direction": (-181.7, 33.3, NO), "speed": (0.7, 2.2, HUGE), "speed_z": (0.3, NO)},
+    "WIND_COV": dict.fromkeys(("wind_x", "wind_y", "wind_z"), (1.1, -0.3, NO, HUGE))
+    | dict.fromkeys(("var_horiz", "var_vert", "wind_alt", "horiz_accuracy", "vert_accuracy"), (0.0,)),
 }
+BOOT_MS = ("ATTITUDE", "SYSTEM_TIME", "SCALED_IMU", "SCALED_IMU2", "SCALED_PRESSURE")
+USEC = ("VIBRATION", "RAW_IMU", "WIND_COV")
+SHOWN = ("RAW_IMU", "SCALED_IMU", "SCALED_IMU2", "VFR_HUD", "SCALED_PRESSURE", "WIND", "WIND_COV")
 FAULTS = ("gap", "twice", "late", "anew", "damage", "version 1", "another sender", "pause", "shared")
+CHANGES = ("reboots", "sets another date", "other autopilot", "is none", "over two links")
 
 
 def _stream(seed: int, faults: dict[str, int]) -> list[Arrival]:
-    """Some hundred frames of several components, with each fault at one place; from "shared" on two share a counter."""
+    """Some hundred frames of several components, with each fault at one place; from "shared" on two share a counter.
+
+    From the place of a change on, system 2 is not what it was. System 4 never tells a UTC.
+    """
     chance = random.Random(seed)
     at, numbers = {place: fault for fault, place in faults.items()}, dict.fromkeys(SENDERS, 250)
     arrivals, now = [], T0
     for place in range(700):
         fault, sender = at.get(place), chance.choice(SENDERS)
+        if sender == (0, 2, 1) and faults.get("over two links", 700) <= place and chance.random() < 0.5:
+            sender = (1, 2, 1)
         source, system, component = (0, 9, 9) if fault == "another sender" else sender
-        name = chance.choice(list(MESSAGES))
-        boot_ms = 20_000 + (now - T0) // 10**6
-        times = {"time_boot_ms": boot_ms, "time_unix_usec": now // 1000}
-        values = MESSAGES[name] | {key: value for key, value in times.items() if key in MESSAGES[name]}
+        changed = {change for change in CHANGES if system == 2 and faults.get(change, 700) <= place}
+        name = chance.choice([*VALUES, *SHOWN, *SHOWN])
+        values = {field: chance.choice(some) for field, some in VALUES[name].items()}
+        boot_ms = (now - T0) // 10**6 + (20_000 if "reboots" not in changed else 1000 - (faults["reboots"] * 4))
+        if name in BOOT_MS:
+            values["time_boot_ms"] = max(boot_ms - chance.choice((0, 0, 30)), 0)
+        if name in USEC:
+            values["time_usec"] = chance.choice((max(boot_ms, 0) * 1000 + 7, 3, 2**64 - 1))
+        if name == "SYSTEM_TIME":
+            late_us = 3_600_000_000 * ("sets another date" in changed) + chance.randrange(3000)
+            values["time_unix_usec"] = 0 if system == 4 else now // 1000 - late_us
+        if name == "HEARTBEAT":
+            values |= {"autopilot": 12} if "other autopilot" in changed else {}
+            values |= {"autopilot": 8, "type": 6} if "is none" in changed else {}
         counter = (0, 1, 1) if sender == (0, 1, 154) and place >= faults.get("shared", 700) else sender
-        numbers[counter] += {"gap": 3, "twice": 0, "late": -4, "anew": -30}.get(fault or "", 1)
+        numbers[counter] = numbers.get(counter, 0) + {"gap": 3, "twice": 0, "late": -4, "anew": -30}.get(fault or "", 1)
         sequence, version = numbers[counter] & 255, 1 if fault == "version 1" else 2
         frame = encode(name, values, system=system, component=component, sequence=sequence, version=version)
         if fault == "damage":
@@ -58,24 +88,33 @@ def _stream(seed: int, faults: dict[str, int]) -> list[Arrival]:
 
 
 def _in_order(said: list[tuple[int, Heard]]) -> list[object]:
-    """What was said, one after the other; when it was heard, of what a stage reads and of what people are told."""
-    told: list[object] = []
+    """What a stage reads and what people are told, when it was heard; then all the rest, by what is in it."""
+    staged: list[object] = []
+    passing: list[object] = []
     for place, heard in said:
         for one in heard.observations:
-            told.append(one if isinstance(one, Attitude) else (place, heard.now, one))
-        told += [(place, heard.now, note) for note in heard.notes]
-    return told
+            if isinstance(one, Many):
+                passing += one
+            elif isinstance(one, Attitude | ImuSample | AirData):
+                passing.append(one)
+            else:
+                staged.append((place, heard.now, one))
+        staged += [(place, heard.now, note) for note in heard.notes]
+    return staged + sorted(passing, key=repr)
 
 
-def test_what_no_stage_reads_is_one_thing_heard_and_apart_from_what_one_reads() -> None:
+def test_what_no_stage_reads_is_one_thing_heard_a_second_and_apart_from_what_one_reads() -> None:
     arrivals = [one for one in _stream(3, {}) if one.source == 0]
     decoder = Decoder(LINKS)
     decoder.hear_many(arrivals[:200])
     said, _ = decoder.hear_many(arrivals[200:])
-    kinds = [[type(one) is Attitude for one in heard.observations] for _, heard in said]
-    assert all(len(set(kind)) <= 1 for kind in kinds)
-    assert max(len(kind) for kind in kinds if kind and kind[0]) > 3
-    assert max(len(kind) for kind in kinds if kind and not kind[0]) == 1
+    passing = [[isinstance(one, Attitude | Many) for one in heard.observations] for _, heard in said]
+    assert all(len(set(one)) <= 1 for one in passing)
+    gathered = [heard for (_, heard), one in zip(said, passing, strict=True) if any(one)]
+    seconds = {heard.now // SECOND for heard in gathered}
+    assert len(gathered) <= len(seconds) + sum(bool(heard.notes) for heard in gathered)
+    many = [one for heard in gathered for one in heard.observations if isinstance(one, Many)]
+    assert max(map(len, many)) > 10
 
 
 def _all_of(decoder: Decoder, now: int) -> str:
@@ -108,19 +147,33 @@ def _state(check: SequenceCheck) -> tuple[object, ...]:
 
 @given(
     st.integers(0, 1000),
-    st.dictionaries(st.sampled_from(FAULTS), st.integers(1, 699), max_size=3),
+    st.dictionaries(st.sampled_from(FAULTS), st.integers(1, 699), max_size=2),
+    st.dictionaries(st.sampled_from(CHANGES), st.integers(1, 699), max_size=2),
     st.integers(100, 700),
+    st.sampled_from((1, 32)),
 )
-@example(0, {"shared": 100}, 120)
-@settings(max_examples=25, deadline=None)
-def test_many_at_once_are_heard_and_counted_as_one_by_one(seed: int, faults: dict[str, int], many: int) -> None:
-    arrivals, now = _stream(seed, faults), 0
+@example(0, {"shared": 100}, {}, 120, 32)
+@example(1, {}, {"reboots": 300}, 350, 1)
+@example(2, {}, {"over two links": 200, "is none": 400}, 700, 1)
+@example(3, {}, {"other autopilot": 150, "sets another date": 400}, 700, 1)
+@settings(max_examples=20, deadline=None)
+def test_many_at_once_are_heard_and_counted_as_one_by_one(
+    seed: int, faults: dict[str, int], changes: dict[str, int], many: int, few: int
+) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(waiting, "_FEW", few)
+        _compare_with_one_by_one(_stream(seed, faults | changes), many)
+
+
+def _compare_with_one_by_one(arrivals: list[Arrival], many: int) -> None:
+    now = 0
     alone, together = Decoder(LINKS), Decoder(LINKS)
     for first in range(0, len(arrivals), many):
         batch = arrivals[first : first + many]
         one_by_one = [(place, heard) for place, one in enumerate(batch) if (heard := alone.hear(one)) is not None]
         said, refused = together.hear_many(batch)
-        assert _in_order(said) == _in_order(one_by_one)
+        assert repr(_in_order(said)) == repr(_in_order(one_by_one))  # bit for bit
+        assert [heard.now for _, heard in said] == sorted(heard.now for _, heard in said)
         assert refused == []
         now = batch[-1].received_at
         assert _all_of(together, now) == _all_of(alone, now)

@@ -1,0 +1,90 @@
+"""Inertial samples of many frames side by side: the same as motion.py reads from one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adapters.columns import payload_dtype
+from adapters.motion import (
+    AXES,
+    CUT_OFF,
+    MILLI_G,
+    RAW_IMU,
+    SCALED_IMU,
+    SCALED_IMU2,
+    SCALED_IMU3,
+)
+from adapters.roles import ARDUPILOT
+from adapters.rows import Floats, Rows, Truths
+from gateway.observation import ImuSample, Many
+
+_SENSORS = {SCALED_IMU: 1, SCALED_IMU2: 2, SCALED_IMU3: 3}
+_FIELDS = ("acceleration_mps2", "angular_rate_radps", "magnetic_field_gauss")
+
+
+@cache
+def axes_dtype(message: int) -> np.dtype[Any]:
+    """The payload of a message with its nine axes in one array, its time and its sensor's number, as far as it has them."""
+    whole: Mapping[str, Any] = payload_dtype(message).fields or {}
+    assert [whole[name][1] - whole[AXES[0]][1] for name in AXES] == list(range(0, 18, 2))
+    named = {name: whole[name] for name in ("time_usec", "time_boot_ms", "id") if name in whole}
+    return np.dtype(
+        {
+            "names": ["axes", *named],
+            "formats": [("<i2", (9,)), *(one[0] for one in named.values())],
+            "offsets": [whole[AXES[0]][1], *(one[1] for one in named.values())],
+            "itemsize": payload_dtype(message).itemsize,
+        }
+    )
+
+
+def raw_imu(rows: Rows) -> Many:
+    """RAW_IMU."""
+    in_milli_g = np.array([one == ARDUPILOT for one in rows.autopilots])[rows.vehicle]
+    rows.count("raw units unknown", ~in_milli_g)
+    some = rows if in_milli_g.all() else rows[in_milli_g]
+    told = some.payloads.view(axes_dtype(RAW_IMU))
+    return _scaled(some, told["axes"], told["time_usec"], told["id"].astype(np.int64) + 1)
+
+
+def scaled_imu(rows: Rows, message: int) -> Many:
+    """SCALED_IMU, SCALED_IMU2, SCALED_IMU3."""
+    told = rows.payloads.view(axes_dtype(message))
+    return _scaled(
+        rows, told["axes"], told["time_boot_ms"].astype(np.int64) * 1000, np.full(len(rows), _SENSORS[message])
+    )
+
+
+def _scaled(rows: Rows, axes: NDArray[np.int16], usec: NDArray[Any], sensor: NDArray[np.int64]) -> Many:
+    """Samples in mG, mrad/s and mgauss."""
+    values = axes.astype(np.float64)
+    cut = np.logical_or.reduce((np.abs(values) >= CUT_OFF).reshape(-1, 3, 3), axis=2)
+    values[:, :3] *= MILLI_G
+    values[:, 3:] /= 1000
+    vectors = values.reshape(-1, 3, 3)
+    rows.count("inertial out of range", np.logical_or.reduce(cut, axis=1))
+    nothing = np.logical_and.reduce(vectors == 0.0, axis=2)
+    nothing[:, 1] &= nothing[:, 0]  # nothing turns beside what is accelerated
+    told = ~cut & ~nothing
+    says = np.logical_or.reduce(told, axis=1)
+    rows.count("inertial unit without data", ~says)
+    vectors[~told] = np.nan
+    _show(rows, sensor, vectors, told)
+    columns = {name: vectors[:, place] for place, name in enumerate(_FIELDS)}
+    return rows.many(ImuSample, says, rows.near(usec), sensor=sensor, **columns)
+
+
+def _show(rows: Rows, sensor: NDArray[np.int64], vectors: Floats, told: Truths) -> None:
+    """Keep for people the last vectors of each vehicle's sensors."""
+    keys = rows.vehicle << 16 | sensor
+    for place in range(3):
+        which = told[:, place]
+        last = dict(zip(keys[which].tolist(), np.flatnonzero(which).tolist(), strict=True))
+        for key, row in last.items():
+            vector = tuple(vectors[row, place].tolist())
+            rows.shown.append((int(rows.places[row]), rows.vehicles[key >> 16].inertial, (key & 0xFFFF, place), vector))
