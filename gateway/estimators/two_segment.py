@@ -30,6 +30,8 @@ STRAIGHT_RPS = 1e-9  # slower turns are none
 ALIGNED_RAD = math.radians(0.5)  # a turn by less is a straight
 LITERAL_ALIGNED_RAD = math.radians(7.5)  # `literal` turns to a point this close to its course, and knows no other way
 ROLL_OUT_RAD = math.radians(45.0)  # who is no more than this beyond its point turns back to it
+ON_CIRCLE = 1.3  # radii: who is this near to a circle's middle is on it
+FOR_GOOD_RAD = 1000.0
 MOST_LEAD = 2.0  # radii: no turn begins earlier before its point
 LEAST_SPEED_MPS = 0.1
 
@@ -44,6 +46,17 @@ class Moving:
 
 
 @dataclass(frozen=True, slots=True)
+class Circles:
+    """Which of n routes' p points are flown round: radius (n, p), positive to the left, NaN = it is flown by; how far (n, p).
+
+    `least` is the angle after which it is left, as soon as the course points at the next point; infinite = never.
+    """
+
+    radius: Floats
+    least: Floats
+
+
+@dataclass(frozen=True, slots=True)
 class Ahead:
     """Where n aircraft are at h horizons: position (n, h, 2), course (n, h) from x towards y, not wrapped."""
 
@@ -51,7 +64,20 @@ class Ahead:
     course: Floats
     turned: Floats  # (n, h) radians turned by until then, whichever way
     passed: Floats  # (n, h) how many points of the route were passed by then
+    over_s: Floats  # (n, h) seconds past the route's last point
     follows: Bools  # (n,) whether there is a path to the first point at all
+
+    def first(self, count: int) -> Ahead:
+        """The same for the first horizons only."""
+        one = slice(0, count)
+        return Ahead(
+            self.position[:, one],
+            self.course[:, one],
+            self.turned[:, one],
+            self.passed[:, one],
+            self.over_s[:, one],
+            self.follows,
+        )
 
 
 @dataclass(slots=True)
@@ -94,6 +120,19 @@ class _Path:
         self.turned = self.turned + np.abs(2.0 * bend)
         self.time_s = self.time_s + duration_s
 
+    def stop(self, speed: Floats, braking: Floats, passed: int) -> None:
+        """Straight on for good, brought to rest where `braking` (n,) m/s2 is not 0."""
+        since = np.maximum(self.horizons - self.time_s[:, None], 0.0)
+        on = self.horizons >= self.time_s[:, None]
+        moving = np.minimum(since, (speed / np.maximum(braking, 1e-9))[:, None])
+        length = speed[:, None] * moving - 0.5 * braking[:, None] * moving * moving
+        way = np.stack([np.cos(self.course), np.sin(self.course)], axis=-1)
+        there = self.position[:, None] + length[..., None] * way[:, None]
+        self.at = np.where(on[..., None], there, self.at)
+        self.course_at = np.where(on, self.course[:, None], self.course_at)
+        self.turned_at = np.where(on, self.turned[:, None], self.turned_at)
+        self.passed_at = np.where(on, float(passed), self.passed_at)
+
 
 def _arc(angle: Floats) -> tuple[Floats, Floats]:
     """Chord over arc, and half the angle, of an arc by an angle."""
@@ -134,11 +173,14 @@ def ahead(
     *,
     rule: Rule = "default",
     wind: Floats | None = None,
+    braking: Floats | None = None,
+    circles: Circles | None = None,
 ) -> Ahead:
     """The paths of n aircraft along their routes (n, p, 2) at horizons (h,) or (n, h); past the last point straight on.
 
     `turning_rps` (n,) is how fast they turn where they do not turn yet; `wind` (n, 2) where the air moves to, m/s, 0 where it
-    is not known. Who cannot come to point at the route is carried on in its present turn, and does not follow.
+    is not known; `braking` (n,) m/s2 of who comes to rest beyond the last point, 0 of others; `circles` which points are flown
+    round. Who cannot come to point at the route is carried on in its present turn, and does not follow.
     """
     n = len(now.position)
     speed = np.sqrt(now.velocity[:, 0] * now.velocity[:, 0] + now.velocity[:, 1] * now.velocity[:, 1])
@@ -147,17 +189,23 @@ def ahead(
     if rule == "literal":
         route, wind = route[:, :1], None
     following = _following(route)
-    turn, rate, follows = _first_turn(now, speed, course, following, turning_rps, rule)
+    target, arrived = _entered(path, following[:, 0], circles, 0)
+    turn, rate, follows = _first_turn(now, speed, course, target, following, turning_rps, rule)
+    turn, follows = np.where(arrived, 0.0, turn), follows | arrived
     ground = speed
     for leg in range(route.shape[1]):
         if leg:
-            turn, rate = _next_turn(path, following[:, leg], ground, turning_rps)
+            target, arrived = _entered(path, following[:, leg], circles, leg)
+            turn, rate = _next_turn(path, target, ground, turning_rps)
+            turn = np.where(arrived, 0.0, turn)
         path.extend(ground, rate, turn / np.maximum(np.abs(rate), STRAIGHT_RPS), leg)
         if wind is not None:
             ground = ground_speed(path.course, speed, course, wind)
-        straight_m = _straight(path, following[:, leg : leg + 2], ground / turning_rps)
+        straight_m = np.where(arrived, 0.0, _straight(path, target, following[:, leg : leg + 2], ground / turning_rps))
         path.extend(ground, np.zeros(n), straight_m / ground, leg)
-    path.extend(ground, np.zeros(n), np.zeros(n), route.shape[1])
+        if circles is not None:
+            _go_round(path, circles, leg, following, ground)
+    path.stop(ground, np.zeros(n) if braking is None else braking, route.shape[1])
     on = _Path.at_start(now.position, course, path.horizons)
     on.extend(speed, now.turn_rate, np.zeros(n), 0)
     chosen = follows[:, None]
@@ -166,6 +214,7 @@ def ahead(
         np.where(chosen, path.course_at, on.course_at),
         np.where(chosen, path.turned_at, on.turned_at),
         np.where(chosen, path.passed_at, 0.0),
+        np.where(chosen, np.maximum(path.horizons - path.time_s[:, None], 0.0), 0.0),
         follows,
     )
 
@@ -178,20 +227,55 @@ def _following(route: Floats) -> Floats:
     return np.stack([*points, points[-1]], axis=1)
 
 
+def _entered(path: _Path, point: Floats, circles: Circles | None, leg: int) -> tuple[Floats, Bools]:
+    """What a leg is flown at (n, 2): its point, or where its circle is entered; and who (n,) is on that circle already."""
+    if circles is None:
+        return point, np.zeros(len(point), dtype=np.bool_)
+    radius = np.abs(circles.radius[:, leg])
+    way = point - path.position
+    distance = np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1])
+    round_it = ~np.isnan(radius)
+    arrived = round_it & (distance <= ON_CIRCLE * radius)
+    sine = np.where(round_it & ~arrived, radius / np.maximum(distance, 1e-9), 0.0)
+    towards = np.arctan2(way[:, 1], way[:, 0]) - np.sign(circles.radius[:, leg]) * np.arcsin(np.minimum(sine, 1.0))
+    length = distance * np.sqrt(np.maximum(1.0 - sine * sine, 0.0))
+    entry = path.position + length[:, None] * np.stack([np.cos(towards), np.sin(towards)], axis=-1)
+    return np.where((round_it & ~arrived)[:, None], entry, point), arrived
+
+
+def _go_round(path: _Path, circles: Circles, leg: int, following: Floats, ground: Floats) -> None:
+    """Round a leg's circle, where it has one, until the next point is ahead and the least angle is flown."""
+    radius = circles.radius[:, leg]
+    round_it = ~np.isnan(radius)
+    if not round_it.any():
+        return
+    way = following[:, leg] - path.position
+    distance = np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1])
+    near = (distance > 0.5 * np.abs(radius)) & (distance <= ON_CIRCLE * np.abs(radius))
+    size = np.where(near, distance, np.abs(radius))  # who is on it stays at the distance that he has
+    size, side = np.where(round_it, size, 1.0), np.sign(np.where(round_it, radius, 1.0))
+    go = np.nan_to_num(angle_to_go(path.position, path.course, size, side, following[:, leg + 1]))
+    least = np.minimum(np.where(round_it, circles.least[:, leg], 0.0), FOR_GOOD_RAD)
+    go = go + FULL_TURN * np.ceil(np.maximum(least - go, 0.0) / FULL_TURN)
+    last = (following[:, leg + 1] == following[:, leg]).all(axis=1)
+    go = np.where(round_it, np.where(last, FOR_GOOD_RAD, go), 0.0)
+    path.extend(ground, np.where(round_it, side * ground / size, 0.0), go * size / ground, leg)
+
+
 def _first_turn(
-    now: Moving, speed: Floats, course: Floats, following: Floats, turning_rps: Floats, rule: Rule
+    now: Moving, speed: Floats, course: Floats, target: Floats, following: Floats, turning_rps: Floats, rule: Rule
 ) -> tuple[Floats, Floats, Bools]:
     """The angle and rate of the turn that leads to the first point, and whether there is one."""
     turns = np.abs(now.turn_rate) > STRAIGHT_RPS
     known = ~np.isnan(following[:, 0, 0])
-    off = np.nan_to_num(_off(now.position, course, following[:, 0]))
+    off = np.nan_to_num(_off(now.position, course, target))
     short = np.where(off < 0.0, -1.0, 1.0)
     goes_on = turns
     if rule == "default":  # who has turned a little too far rolls out, and does not go round once more
         beyond = np.sign(now.turn_rate) * off
         goes_on = turns & ~((beyond < 0.0) & (beyond > -ROLL_OUT_RAD))
     rate = np.where(goes_on, now.turn_rate, short * turning_rps)
-    go = angle_to_go(now.position, course, speed / np.abs(rate), np.sign(rate), following[:, 0])
+    go = angle_to_go(now.position, course, speed / np.abs(rate), np.sign(rate), target)
     turn = np.where(~turns & (np.abs(off) <= ALIGNED_RAD), 0.0, np.nan_to_num(go))
     if rule == "literal":
         return turn, rate, known & np.where(turns, ~np.isnan(go), np.abs(off) <= LITERAL_ALIGNED_RAD)
@@ -208,13 +292,14 @@ def _next_turn(path: _Path, point: Floats, ground: Floats, turning_rps: Floats) 
     return np.where(small, 0.0, np.where(np.isnan(go), np.abs(off), go)), side * turning_rps
 
 
-def _straight(path: _Path, following: Floats, radius: Floats) -> Floats:
-    """How far (n,) it is straight on to a point, (n, 0, 2), less what the turn to the one after it, (n, 1, 2), needs."""
-    way = following[:, 0] - path.position
+def _straight(path: _Path, target: Floats, following: Floats, radius: Floats) -> Floats:
+    """How far (n,) it is straight on to a target (n, 2), less what the turn to the point after it, (n, 1, 2), needs."""
+    way = target - path.position
     distance = np.nan_to_num(way[:, 0] * np.cos(path.course) + way[:, 1] * np.sin(path.course))
     further = following[:, 1] - following[:, 0]
     turn = wrapped(np.arctan2(further[:, 1], further[:, 0]) - path.course)
-    turn = np.where((further == 0.0).all(axis=1) | np.isnan(turn), 0.0, np.abs(turn))
+    entering = (target != following[:, 0]).any(axis=1)  # a circle: it is not cut short
+    turn = np.where((further == 0.0).all(axis=1) | np.isnan(turn) | entering, 0.0, np.abs(turn))
     lead = radius * np.minimum(np.tan(0.5 * np.minimum(turn, 0.75 * math.pi)), MOST_LEAD)
     return np.maximum(distance - lead, 0.0)
 

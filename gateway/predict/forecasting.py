@@ -10,14 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators import two_segment
-from gateway.estimators.intent import BELIEVED, USED_IN_TURN_RAD, to_turn
+from gateway.estimators.intent import BELIEVED, USED_IN_TURN_RAD, to_turn, wrapped
 from gateway.frames import RunwayFrame
 from gateway.fuse import Lane, knows_height
 from gateway.fuse.weighting import Model
 from gateway.predict.goals import COUNT, GO_AROUND, LEGS, RUNWAY, Goals, goals_of
 from gateway.predict.heights import heights
 from gateway.predict.minds import Minds, Remembered
-from gateway.predict.spread import spread
+from gateway.predict.spread import (
+    ALONG_POINTS,
+    BY_MODEL,
+    ENDS_LANDED,
+    ENDS_ROUND,
+    ROUND_A_POINT,
+    beside,
+    spread,
+)
 from gateway.predict.table import Forecast
 from gateway.predict.thinking import Motions, inferred, motions, trusted
 from gateway.predict.told import SECOND, Said, Tellings
@@ -30,6 +38,8 @@ Bools = NDArray[np.bool_]
 NONE, INFERRED, DECLARED_KIND = 0, 1, 2
 TRUSTED = 0.5  # a declared goal with this trust is flown to
 WIND_WITHIN = 60 * SECOND  # a wind told this lately is still so
+LANDED_MPS2, ROUND_MPS2 = 2.0, 20.0  # braking beyond a landing, and at the middle of a circle that is to be flown
+CIRCLE_LEAST, CIRCLE_MOST = 0.4, 2.0  # turn rate over that of a circle about the point: between them it is flown round
 FINAL_M, FINAL_RAD = (
     30_000.0,
     math.radians(5.0),
@@ -87,6 +97,10 @@ class _Chosen:
     route: Floats  # (n, 4, 2), NaN = the model's
     up: Floats  # (n, 4)
     lands: Bools  # (n, 4)
+    circles: Bools  # (n,) about a point, at a rate (n,)
+    rate: Floats
+    rounds: two_segment.Circles
+    ends_round: Bools  # (n,) the route ends at a point that is flown round
     best: Ints  # (n,) the candidate that is told, -1 = none
     kind: Ints
     confidence: Floats
@@ -116,10 +130,20 @@ def forecast(
     chosen, minds = _chosen(before, at, now, goals, routes, state, site, frame)
     minds = replace(minds, courses=courses, interval_s=interval_s, turn_rate=now.turn_rate)
     horizons = state.since_s[:, None] + np.array(horizons_s)
-    start = two_segment.Moving(state.at_position, state.velocity, now.turn_rate)
-    ahead = two_segment.ahead(start, chosen.route, horizons, now.turning, wind=_winds(predicting, lanes, at))
-    by_points = ahead.follows
-    sigma = spread(now, ahead, horizons, state.place_sigma, state.velocity_sigma, by_points)
+    start = two_segment.Moving(state.at_position, state.velocity, np.where(chosen.circles, chosen.rate, now.turn_rate))
+    around = beside(horizons)
+    braking = np.where(chosen.lands.any(axis=1), LANDED_MPS2, np.where(chosen.ends_round, ROUND_MPS2, 0.0))
+    whole = two_segment.ahead(
+        start,
+        chosen.route,
+        around,
+        now.turning,
+        wind=_winds(predicting, lanes, at),
+        braking=braking,
+        circles=chosen.rounds if np.isfinite(chosen.rounds.radius).any() else None,
+    )
+    ahead, by_points = whole.first(horizons.shape[1]), whole.follows | chosen.circles
+    sigma = spread(now, whole, horizons, state.place_sigma, state.velocity_sigma, _rests(chosen, whole))
     up = heights(state.up, state.climb, now, ahead, chosen.up, chosen.lands, chosen.route, horizons)
     mean = np.concatenate([ahead.position, up[..., None]], axis=2)
     told_names = [one.names[best] if best >= 0 else None for one, best in zip(goals, chosen.best.tolist(), strict=True)]
@@ -177,11 +201,18 @@ class _State:
             np.sqrt(velocity[:, 0] * velocity[:, 0] + velocity[:, 1] * velocity[:, 1]),
             mean[:, 2],
             mean[:, 5],
-            np.sqrt(0.5 * (variance[:, 0] + variance[:, 1])),
+            _reported_sigma(covariance),
             np.sqrt(0.5 * (variance[:, 3] + variance[:, 4])),
             sides,
             knows_height(events, [at] * len(events), covariance),
         )
+
+
+def _reported_sigma(covariance: Floats) -> Floats:
+    """Sigma (n,) an axis of where a track is as its position source will say it: the source's own error stays the same."""
+    axes = np.arange(2)
+    error = 2.0 * covariance[:, axes, axes + 6] + covariance[:, axes + 6, axes + 6]
+    return np.asarray(np.sqrt(np.maximum((covariance[:, axes, axes] + error).mean(axis=1), 0.0)))
 
 
 def _usual_rate(speed: Floats, model: Model) -> Floats:
@@ -224,10 +255,25 @@ def _chosen(
     kind = np.where(best < 0, NONE, np.where(best == declared, DECLARED_KIND, INFERRED))
     confidence = np.where(kind == NONE, math.nan, np.where(kind == DECLARED_KIND, trust, belief.confidence))
     taken = np.where((trusts | infers)[:, None, None], routes[rows, np.maximum(best, 0)], math.nan)
-    taken = np.where((trusts & circles)[:, None, None], math.nan, taken)
+    unknown = np.array([one.rounds[place] for one, place in zip(goals, said.tolist(), strict=True)])
+    circling, rate = _circling(now, goal, trusts & circles & unknown)
+    taken = np.where(circling[:, None, None], math.nan, taken)
     up = np.stack([one.up[place] for one, place in zip(goals, np.maximum(best, 0).tolist(), strict=True)])
     up = np.where((trusts | infers)[:, None], up, math.nan)
     lands = np.stack([one.lands[place] for one, place in zip(goals, np.maximum(best, 0).tolist(), strict=True)])
+    ends_round = np.stack([one.rounds[place] for one, place in zip(goals, np.maximum(best, 0).tolist(), strict=True)])
+    radius = np.stack([one.radius[place] for one, place in zip(goals, np.maximum(best, 0).tolist(), strict=True)])
+    least = np.stack([one.least[place] for one, place in zip(goals, np.maximum(best, 0).tolist(), strict=True)])
+    circled = _circled(
+        before,
+        now,
+        goal,
+        np.stack([one.radius[place, 0] for one, place in zip(goals, said.tolist(), strict=True)]),
+        since,
+    )
+    least[:, 0] = np.where(best == declared, np.maximum(least[:, 0] - circled, 0.0), least[:, 0])
+    rounds = two_segment.Circles(np.where((trusts | infers)[:, None], radius, math.nan), least)
+    ends_round = ends_round & (trusts | infers)
     minds = replace(
         before,
         at=np.full(n, at),
@@ -238,8 +284,35 @@ def _chosen(
         flown_at=seen.flown_at,
         trust=np.nan_to_num(trust),
         declared_at=np.where(declared >= 0, since, before.declared_at),
+        circled=circled,
     )
-    return _Chosen(taken, up, lands, best, kind, confidence), minds
+    lands = lands & (trusts | infers)[:, None]
+    return _Chosen(taken, up, lands, circling, rate, rounds, ends_round, best, kind, confidence), minds
+
+
+def _circling(now: Motions, centre: Floats, should: Bools) -> tuple[Bools, Floats]:
+    """Who flies round a point (n, 2) as it `should` (n,), and the rate (n,) of the turn that stays at its distance."""
+    way = centre - now.position
+    distance = np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1])
+    rate = now.speed / np.maximum(distance, 1.0)
+    to_left = np.where(way[:, 1] * now.velocity[:, 0] - way[:, 0] * now.velocity[:, 1] > 0.0, 1.0, -1.0)
+    turns_alike = (now.turn_rate * to_left > CIRCLE_LEAST * rate) & (now.turn_rate * to_left < CIRCLE_MOST * rate)
+    return should & turns_alike, to_left * rate
+
+
+def _circled(before: Minds, now: Motions, centre: Floats, radius: Floats, since: Ints) -> Floats:
+    """How far (n,) each aircraft has flown round its declared point (n, 2), of a radius (n,), NaN = it is not flown round."""
+    way = centre - now.position
+    near = np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1]) <= two_segment.ON_CIRCLE * np.abs(radius)
+    turned = np.abs(wrapped(now.course - before.courses[:, 0]))
+    return np.where(near & (before.declared_at == since), before.circled + np.nan_to_num(turned), 0.0)
+
+
+def _rests(chosen: _Chosen, whole: two_segment.Ahead) -> Ints:
+    """What is known of each aircraft's way (n,): `spread`'s kinds."""
+    kind = np.where(whole.follows, np.where(chosen.ends_round, ENDS_ROUND, ALONG_POINTS), BY_MODEL)
+    kind = np.where(whole.follows & chosen.lands.any(axis=1), ENDS_LANDED, kind)
+    return np.where(chosen.circles, ROUND_A_POINT, kind)
 
 
 def _on_final(now: Motions, site: Site, frame: RunwayFrame) -> Bools:

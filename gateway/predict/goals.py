@@ -26,6 +26,7 @@ DECLARED, HOME = 10, 11
 PUBLISHED = range(12, 16)
 RUNWAY, GO_AROUND = 16, 17
 AROUND = range(18, 20)  # beside weather that lies across the way
+FULL_TURN = 2.0 * math.pi
 SAME_PLACE_RAD = 1e-6
 GO_AROUND_M = 5000.0  # beyond the runway's far end
 
@@ -40,6 +41,9 @@ class Goals:
     planned: Bools  # (20,)
     lands: Bools  # (20, 4)
     circles: Bools  # (20,) a point to be flown round, not over
+    rounds: Bools  # (20,) such a point, of which the radius is not known, is the last of the route
+    radius: Floats  # (20, 4) of what is flown round, positive to the left; NaN = none, or not known
+    least: Floats  # (20, 4) radians that are flown round it at least
     declared: int = -1  # which one it is said to go to
     declared_at: int = 0
 
@@ -57,19 +61,28 @@ def goals_of(told: Told | None, site: Site, frame: RunwayFrame, separation_m: fl
             :2
         ]
         names[slot] = waypoint.name
+    none = np.full((COUNT, LEGS), math.nan)
     if told is None:
-        return Goals(route, up, tuple(names), planned, lands, circles)
+        return Goals(route, up, tuple(names), planned, lands, circles, circles, none, none)
     declared, points, home_m = told.declared, _points(told.plan), _home_m(told.plan)
     if declared is not None and declared.sequence is not None:
         points = [point for point in points if point.sequence >= declared.sequence]
     places = [_place(point, home_m, separation_m, site, frame) for point in points[: len(PLANNED) + LEGS]]
+    rounds = np.zeros(COUNT, dtype=np.bool_)
+    radius, least = np.full((COUNT, LEGS), math.nan), np.zeros((COUNT, LEGS))
     for slot in PLANNED:
-        following = places[slot : slot + LEGS]
+        following = _until_a_circle(places[slot : slot + LEGS], points[slot : slot + LEGS])
         if not following:
             break
+        last = points[slot + len(following) - 1]
+        rounds[slot] = last.kind == "loiter" and last.radius_m is None
+        for leg, point in enumerate(points[slot : slot + len(following)]):
+            if point.kind == "loiter" and point.radius_m is not None:
+                radius[slot, leg] = -point.radius_m
+                least[slot, leg] = math.inf if point.turns is None else point.turns * FULL_TURN
         route[slot, : len(following)] = [enu[:2] for enu in following]
         up[slot, : len(following)] = [enu[2] for enu in following]
-        lands[slot, : len(following)] = [point.kind == "landing" for point in points[slot : slot + LEGS]]
+        lands[slot, : len(following)] = [point.kind == "landing" for point in points[slot : slot + len(following)]]
         names[slot], planned[slot] = f"{points[slot].kind} {points[slot].sequence}", True
         circles[slot] = points[slot].kind == "loiter"
     if told.plan is not None and told.plan.points and told.plan.points[0].kind == "home":
@@ -80,7 +93,15 @@ def goals_of(told: Told | None, site: Site, frame: RunwayFrame, separation_m: fl
         route[DECLARED, 0], up[DECLARED, 0] = _declared_place(declared, separation_m, site, frame)
         names[DECLARED] = "next waypoint" if declared.sequence is None else f"item {declared.sequence}"
     since = declared.valid_at if declared is not None else 0
-    return Goals(route, up, tuple(names), planned, lands, circles, chosen, since)
+    return Goals(route, up, tuple(names), planned, lands, circles, rounds, radius, least, chosen, since)
+
+
+def _until_a_circle(places: list[Floats], points: Sequence[PlanPoint]) -> list[Floats]:
+    """The places up to the first that is flown round nobody says how."""
+    for count, point in enumerate(points, 1):
+        if point.kind == "loiter" and point.radius_m is None:
+            return places[:count]
+    return places
 
 
 def _points(plan: FlightPlan | None) -> list[PlanPoint]:

@@ -35,6 +35,7 @@ class Minds:
     flown_at: Floats  # (n, 20)
     trust: Floats  # (n,) that it goes where it declared
     declared_at: Ints  # (n,) since when it is said to go there
+    circled: Floats  # (n,) radians flown round it, if it is a point that is flown round
 
     @classmethod
     def empty(cls, n: int) -> Minds:
@@ -53,6 +54,7 @@ class Minds:
             seen.flown_at,
             zero,
             np.full(n, UNKNOWN),
+            zero,
         )
 
     @property
