@@ -121,6 +121,9 @@ class _Maker:
             method=("model",) * 3,
             intent=(None,) * 3,
             intent_kind=(None,) * 3,
+            sigma_along_m=15.0 + horizon**1.3 * 3.0,
+            sigma_across_m=15.0 + horizon**1.3 * 3.0,
+            course_rad=np.zeros(3),
             confidence=np.full(3, np.nan),
             runway_m=ahead,
         )
