@@ -45,6 +45,8 @@ Examples:
   talkdown replay sessions/20260301T120000Z-demo-field --viewer none --json
 """
 
+_SMOOTHED_IN_PASSING = """The smoothed tracks are compared with the truth and drawn, where there is one; \
+to keep them, name a folder with --archive."""
 SMOOTHED = ("kalman", "imm", "rmimm")  # the estimators that a smoother can go back over
 
 FilesArgument = Annotated[
@@ -199,6 +201,15 @@ def seek(
     return playback, options
 
 
+def check_smoothing(options: Options) -> None:
+    """Raise UsageError where --smooth was asked for with an estimator that it cannot go back over."""
+    if options.estimator not in SMOOTHED:
+        raise UsageError(
+            f"--smooth cannot go back over {options.estimator}, which keeps no covariances that hold together; "
+            f"choose --estimator {', '.join(SMOOTHED[:-1])} or {SMOOTHED[-1]}."
+        )
+
+
 def replay(
     files: FilesArgument,
     section: Section = Section(),
@@ -228,11 +239,8 @@ def replay(
     try:
         playback = open_playback(files, read_plans(plan), signing_key)
         options = methods.change(playback.options)
-        if smooth and options.estimator not in SMOOTHED:
-            raise UsageError(
-                f"--smooth cannot go back over {options.estimator}, which keeps no covariances that hold together; "
-                f"choose --estimator {', '.join(SMOOTHED[:-1])} or {SMOOTHED[-1]}."
-            )
+        if smooth:
+            check_smoothing(options)
         playback, options = seek(playback, options, section.begin, section.end, section.mute)
         setup = replace(
             _setup(playback, place, files[0].stem, seen, looks),
@@ -250,10 +258,7 @@ def replay(
             for note in playback.notes:
                 display.say(note)
             if smooth and seen.archive is None:
-                display.say(
-                    "The smoothed tracks are compared with the truth and drawn, where there is one; "
-                    "to keep them, name a folder with --archive."
-                )
+                display.say(_SMOOTHED_IN_PASSING)
             summary = run_replay(
                 playback,
                 setup,
