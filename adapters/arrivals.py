@@ -17,6 +17,13 @@ Integers = NDArray[np.int64]
 _made: Callable[[tuple[int, int, bytes, str]], Arrival] = partial(tuple.__new__, Arrival)
 
 
+def are_first(ordered: Integers) -> NDArray[np.bool_]:
+    """Which elements differ from the one before; the first of all does."""
+    first = np.ones(len(ordered), np.bool_)
+    np.not_equal(ordered[1:], ordered[:-1], out=first[1:])
+    return first
+
+
 class Arrivals(Sequence[Arrival]):
     """Arrivals in the order of their stamps; read one by one they are what they are: `Arrival`.
 
@@ -68,10 +75,15 @@ class Arrivals(Sequence[Arrival]):
         """Each source, and the places of what came from it."""
         order = np.argsort(self.source, kind="stable")
         ordered = self.source[order]
-        begins = np.flatnonzero(np.diff(ordered, prepend=-1)).tolist()
-        places = order.tolist()
+        begins, places = np.flatnonzero(are_first(ordered)).tolist(), order.tolist()
         for begin, end in pairwise((*begins, len(places))):
             yield int(ordered[begin]), places[begin:end]
+
+    def last_of_each(self) -> list[tuple[int, int]]:
+        """Each source, and the stamp of what came last from it."""
+        last = np.full(int(self.source.max(initial=-1)) + 1, -1)
+        last[self.source] = np.arange(len(self))
+        return [(number, int(self.received_at[last[number]])) for number in np.flatnonzero(last >= 0).tolist()]
 
     def at(self, places: Integers) -> Iterator[Arrival]:
         """Those at some places."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.columns import payload_dtype
+from adapters.moments import LEAST_UNIX_USEC
 from adapters.motion import (
     AXES,
     CUT_OFF,
@@ -20,7 +21,7 @@ from adapters.motion import (
     SCALED_IMU3,
 )
 from adapters.roles import ARDUPILOT
-from adapters.rows import Floats, Rows, Truths
+from adapters.rows import Floats, Integers, Rows, Truths
 from gateway.observation import ImuSample, Many
 
 _SENSORS = {SCALED_IMU: 1, SCALED_IMU2: 2, SCALED_IMU3: 3}
@@ -43,25 +44,13 @@ def axes_dtype(message: int) -> np.dtype[Any]:
     )
 
 
-def raw_imu(rows: Rows) -> Many:
-    """RAW_IMU."""
-    in_milli_g = np.array([one == ARDUPILOT for one in rows.autopilots])[rows.vehicle]
-    rows.count("raw units unknown", ~in_milli_g)
-    some = rows if in_milli_g.all() else rows[in_milli_g]
-    told = some.payloads.view(axes_dtype(RAW_IMU))
-    return _scaled(some, told["axes"], told["time_usec"], told["id"].astype(np.int64) + 1)
-
-
-def scaled_imu(rows: Rows, message: int) -> Many:
-    """SCALED_IMU, SCALED_IMU2, SCALED_IMU3."""
-    told = rows.payloads.view(axes_dtype(message))
-    return _scaled(
-        rows, told["axes"], told["time_boot_ms"].astype(np.int64) * 1000, np.full(len(rows), _SENSORS[message])
-    )
-
-
-def _scaled(rows: Rows, axes: NDArray[np.int16], usec: NDArray[Any], sensor: NDArray[np.int64]) -> Many:
-    """Samples in mG, mrad/s and mgauss."""
+def scaled_imu(rows: Rows, payloads: Sequence[tuple[int, bytes]]) -> Many:
+    """RAW_IMU, SCALED_IMU, SCALED_IMU2, SCALED_IMU3: samples in mG, mrad/s and mgauss."""
+    axes, usec, sensor, in_milli_g = map(np.concatenate, zip(*(_told(*one) for one in payloads), strict=True))
+    known = in_milli_g | np.array([one == ARDUPILOT for one in rows.autopilots])[rows.vehicle]
+    if not known.all():
+        rows.count("raw units unknown", ~known)
+        rows, axes, usec, sensor = rows[known], axes[known], usec[known], sensor[known]
     values = axes.astype(np.float64)
     cut = np.logical_or.reduce((np.abs(values) >= CUT_OFF).reshape(-1, 3, 3), axis=2)
     values[:, :3] *= MILLI_G
@@ -79,12 +68,23 @@ def _scaled(rows: Rows, axes: NDArray[np.int16], usec: NDArray[Any], sensor: NDA
     return rows.many(ImuSample, says, rows.near(usec), sensor=sensor, **columns)
 
 
+def _told(message: int, block: bytes) -> tuple[NDArray[np.int16], Integers, Integers, Truths]:
+    """Axes, time, sensor of the payloads of one message, and whether they are surely in mG."""
+    told = np.frombuffer(block, axes_dtype(message))
+    if message == RAW_IMU:
+        usec = np.minimum(told["time_usec"], LEAST_UNIX_USEC).astype(np.int64)
+        return told["axes"], usec, told["id"].astype(np.int64) + 1, np.zeros(len(told), np.bool_)
+    sensor = np.full(len(told), _SENSORS[message])
+    return told["axes"], told["time_boot_ms"].astype(np.int64) * 1000, sensor, np.ones(len(told), np.bool_)
+
+
 def _show(rows: Rows, sensor: NDArray[np.int64], vectors: Floats, told: Truths) -> None:
     """Keep for people the last vectors of each vehicle's sensors."""
+    order = np.argsort(rows.places)
     keys = rows.vehicle << 16 | sensor
     for place in range(3):
-        which = told[:, place]
-        last = dict(zip(keys[which].tolist(), np.flatnonzero(which).tolist(), strict=True))
+        which = order[told[order, place]]
+        last = dict(zip(keys[which].tolist(), which.tolist(), strict=True))
         for key, row in last.items():
             vector = tuple(vectors[row, place].tolist())
             rows.shown.append((int(rows.places[row]), rows.vehicles[key >> 16].inertial, (key & 0xFFFF, place), vector))

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]
 
 
-_BY_ROW = ("payloads", "places", "received_at", "vehicle", "source", "newest", "added", "knows_time")
+_BY_ROW = ("places", "received_at", "vehicle", "source", "newest", "added", "knows_time")
 Shown = tuple[int, MutableMapping[Any, Any], Any, Any]
 
 
@@ -33,7 +33,6 @@ class Rows:
     it to the session's time; of a sender that has told no time (`knows_time`) they are the stamp, and what brings that to it.
     """
 
-    payloads: NDArray[Any]
     places: Integers
     received_at: Integers
     vehicle: Integers

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from adapters import Arrival
-from adapters.arrivals import Arrivals, Integers
+from adapters.arrivals import Arrivals, Integers, are_first
 from adapters.epoch import SessionEpoch
 from adapters.frame_batches import Head, Heads, Wanted, heads_of, payload_of, places_of, wanted
 from adapters.gathering import PASSING, Gathered, Said
@@ -51,10 +51,10 @@ class Together:
         hearing = _Hearing(self, arrivals, heads, components, senders)
         left = np.flatnonzero(places_of(heads, self.which) | (senders < 0))
         seconds = arrivals.received_at[left] // SECOND
-        for places in np.split(left, np.flatnonzero(np.diff(seconds)) + 1):
+        for places in np.split(left, np.flatnonzero(are_first(seconds))[1:]):
             hearing.hear_second(places)
-        for number, of_source in arrivals.by_source():
-            self.listened[number].last_heard = int(arrivals.received_at[of_source[-1]])
+        for number, stamp in arrivals.last_of_each():
+            self.listened[number].last_heard = stamp
         return hearing.gathered.said, hearing.refused
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.arrivals import Arrivals, Integers
+from adapters.arrivals import Arrivals, Integers, are_first
 from adapters.frame_batches import NO_HEAD, Heads
 from adapters.listening import Listened
 from adapters.vehicles import Component
@@ -80,9 +80,11 @@ def _by_component(source: Integers, head: Heads, listened: Mapping[int, Listened
     order = np.argsort(senders, kind="stable")
     senders, head = senders[order], head[order]
     sequence, messages = head & 255, head >> 24
-    is_first = np.diff(senders, prepend=-1) != 0
+    is_first = are_first(senders)
     begins = np.flatnonzero(is_first)
-    runs_on = np.logical_and.reduceat(is_first | (np.diff(sequence, prepend=0) & 255 == 1), begins).tolist()
+    goes_on = is_first.copy()
+    goes_on[1:] |= sequence[1:] - sequence[:-1] & 255 == 1
+    runs_on = np.logical_and.reduceat(goes_on, begins).tolist()
     bounds = pairwise((*begins.tolist(), len(order)))
     for sender, (begin, end), first, runs in zip(
         senders[begins].tolist(), bounds, sequence[begins].tolist(), runs_on, strict=True

@@ -8,19 +8,18 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from functools import partial
+from itertools import groupby
 from operator import itemgetter
-from types import MappingProxyType
 from typing import TypeVar
 
 import numpy as np
 
 from adapters import air, air_columns, motion, motion_columns
-from adapters.arrivals import Arrivals, Integers
+from adapters.arrivals import Arrivals, Integers, are_first
 from adapters.columns import payload_dtype
 from adapters.epoch import SessionEpoch
 from adapters.frame_batches import Heads, places_of, wanted
+from adapters.framing import EXTRAS
 from adapters.listening import Listened
 from adapters.meters import SECOND
 from adapters.rows import Rows, Shown
@@ -28,20 +27,20 @@ from adapters.vehicle import Vehicle
 from adapters.vehicles import Component
 from gateway.observation import Many
 
-_READERS: Mapping[int, Callable[[Rows], Many]] = MappingProxyType(
-    {
-        motion.RAW_IMU: motion_columns.raw_imu,
-        **{
-            message: partial(motion_columns.scaled_imu, message=message)
-            for message in (motion.SCALED_IMU, motion.SCALED_IMU2, motion.SCALED_IMU3)
-        },
-        air.VFR_HUD: air_columns.hud,
-        air.SCALED_PRESSURE: air_columns.pressure,
-        air.WIND: air_columns.wind,
-        air.WIND_COV: air_columns.wind_components,
-    }
+Reader = Callable[[Rows, Sequence[tuple[int, bytes]]], Many]
+"""What rows say, whose payloads stand end to end, message after message."""
+
+_FAMILIES: Sequence[tuple[Reader, tuple[int, ...]]] = (
+    (motion_columns.scaled_imu, (motion.RAW_IMU, motion.SCALED_IMU, motion.SCALED_IMU2, motion.SCALED_IMU3)),
+    (air_columns.hud, (air.VFR_HUD,)),
+    (air_columns.pressure, (air.SCALED_PRESSURE,)),
+    (air_columns.wind, (air.WIND,)),
+    (air_columns.wind_components, (air.WIND_COV,)),
 )
-_WAITING = wanted(_READERS)
+_READ = tuple((reader, message) for reader, messages in _FAMILIES for message in messages)
+_ORDER = np.zeros(len(EXTRAS), np.int64)  # by message id: its place in _READ
+_ORDER[[message for _, message in _READ]] = np.arange(len(_READ))
+_WAITING = wanted([message for _, message in _READ])
 Number = TypeVar("Number", int, Integers)
 _FEW = 32  # for fewer it is quicker to read one after the other
 
@@ -123,20 +122,21 @@ class Waiting:
         if not len(places):
             return found, said, -1
         self._mark_heard(places)
-        messages = self._heads[places] >> 24
-        order = np.argsort(messages, kind="stable")
-        rows = self._rows(places[order], shown, said)
-        begins = np.flatnonzero(np.diff(messages[order], prepend=-1)).tolist()
-        for begin, end in zip(begins, [*begins[1:], len(order)], strict=True):
-            message = int(messages[order[begin]])
-            some = self._with_payloads(rows, slice(begin, end), message)
-            one = _READERS[message](some)
+        kinds = _ORDER[self._heads[places] >> 24]
+        order = np.argsort(kinds, kind="stable")
+        rows, places, kinds = self._rows(places[order], shown, said), places[order], kinds[order]
+        begins = np.flatnonzero(are_first(kinds)).tolist()
+        bounds = list(zip(kinds[begins].tolist(), begins, [*begins[1:], len(kinds)], strict=True))
+        for reader, of_family in groupby(bounds, lambda one: _READ[one[0]][0]):
+            parts = list(of_family)
+            payloads = [self._payloads(_READ[kind][1], places[begin:end]) for kind, begin, end in parts]
+            one = reader(rows[parts[0][1] : parts[-1][2]], payloads)
             if len(one):
                 found.append(one)
         shown.sort(key=itemgetter(0))
         for _, where, name, value in shown:
             where[name] = value
-        return found, said, int(places[-1])
+        return found, said, int(places.max())
 
     def _rows(self, places: Integers, shown: list[Shown], said: Counter[int]) -> Rows:
         senders, received_at = self._senders[places], self._arrivals.received_at[places]
@@ -145,7 +145,6 @@ class Waiting:
         knows_time = mark[:, 4] == 1
         newest = np.where(knows_time, mark[:, 1] + np.clip(received_at - mark[:, 2], 0, SECOND), received_at)
         return Rows(
-            places,
             places,
             received_at,
             self._number[senders],
@@ -160,8 +159,6 @@ class Waiting:
             said,
         )
 
-    def _with_payloads(self, rows: Rows, which: slice, message: int) -> Rows:
-        dtype, data = payload_dtype(message), self._arrivals.data
-        size = dtype.itemsize
-        block = b"".join([data[place][10:-2].ljust(size, b"\0")[:size] for place in rows.places[which].tolist()])
-        return replace(rows[which], payloads=np.frombuffer(block, dtype))
+    def _payloads(self, message: int, places: Integers) -> tuple[int, bytes]:
+        size, data = payload_dtype(message).itemsize, self._arrivals.data
+        return message, b"".join([data[place][10:-2].ljust(size, b"\0")[:size] for place in places.tolist()])
