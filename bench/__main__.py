@@ -14,6 +14,7 @@ from rich.table import Table
 
 from bench.clutter import clutter
 from bench.estimation import estimation
+from bench.hundred_hours import HEADINGS, hundred_hours
 from bench.live_fleet import live_fleet
 from bench.live_rates import live_rates
 from bench.lively import core_share, lateness
@@ -25,6 +26,10 @@ from bench.wires import wires
 FLEETS = (1, 30)
 THROUGHPUT_S = 120.0
 RATES_S = 60.0
+TRAFFIC_HOURS, MANY_TRAFFIC_HOURS = (
+    20,
+    100,
+)  # with aircraft in the first 50 minutes of every two hours, and in 8.8 of every ten
 
 
 class Part(StrEnum):
@@ -40,13 +45,16 @@ class Part(StrEnum):
     estimation = "estimation"
     clutter = "clutter"
     fleet = "fleet"
+    memory = "memory"
     hours = "hours"
 
 
 def bench(
     runs: Annotated[int, typer.Option("--runs", metavar="N", min=1, help="How often what is short is measured.")] = 5,
     seconds: Annotated[float, typer.Option("--seconds", metavar="S", min=5.0, help="How long live runs last.")] = 30.0,
-    long: Annotated[bool, typer.Option("--long", help="Also replay ten hours, which takes minutes.")] = False,
+    long: Annotated[
+        bool, typer.Option("--long", help="Also replay ten hours, and a hundred of traffic: minutes.")
+    ] = False,
     only: Annotated[list[Part] | None, typer.Option("--only", help="Only this; repeatable.")] = None,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write every sample there.", show_default=False)
@@ -56,7 +64,7 @@ def bench(
     wanted = set(only or Part) - (set() if long or only else {Part.hours})
     console = Console(width=max(Console().width, 110))
     console.print(f"{machine()}; {load()}")
-    figures = _measure(wanted, runs, seconds, Console(stderr=True))
+    figures = _measure(wanted, runs, seconds, MANY_TRAFFIC_HOURS if long else TRAFFIC_HOURS, Console(stderr=True))
     console.print(_table(figures))
     console.print(load())
     if json_file is not None:
@@ -66,7 +74,7 @@ def bench(
         raise typer.Exit(1)
 
 
-def _measure(wanted: set[Part], runs: int, seconds: float, console: Console) -> list[Figure]:
+def _measure(wanted: set[Part], runs: int, seconds: float, traffic_hours: int, console: Console) -> list[Figure]:
     def say(text: str) -> None:
         console.print(text, style="dim", highlight=False)
 
@@ -101,6 +109,9 @@ def _measure(wanted: set[Part], runs: int, seconds: float, console: Console) -> 
         if Part.fleet in wanted:
             say("100 vehicles with two radars, and 1000 aircraft, live")
             figures += live_fleet(RATES_S)
+        if Part.memory in wanted:
+            say(f"what is held after {traffic_hours} hours of traffic that comes and goes\n{HEADINGS}")
+            figures += hundred_hours(say, traffic_hours)
         if Part.hours in wanted:
             figures += ten_hours(folder, say)
     return figures

@@ -1,6 +1,7 @@
 """A hundred hours of traffic that comes and goes: what a session holds in memory at the end, and at its beginning.
 
 python -m bench.hundred_hours [HOURS]      prints a table; exit code 1 where memory has grown
+python -m bench --only memory [--long]     20 hours, or 100
 
 A visitor comes every minute and stays for one or two: a vehicle, traffic that others tell of, a target that only the radar
 sees, or two of these. Links drop for a while and come back, radars lose targets and number them anew, some plots are of
@@ -42,6 +43,7 @@ EVERY_S, GPS_S, SCAN_S, STEP_S = 60, 5, 4, 30
 VEHICLES, CROWD_S, CROWD_EACH_S, CROWD_STAYS_S = 40, 800, 3, 17
 PARTS, QUIET_S = 10, 70 * 60
 APART = {"site", "options", "frame", "radars"}  # of the state: what was settled before the first arrival
+HEADINGS = "  hour   tracks   state, kB decoder, kB  others, kB     RSS, MB"
 NOISE_MB = 8.0  # of the process: what allocators keep differs from hour to hour
 
 Floats = NDArray[np.float64]
@@ -245,7 +247,7 @@ def _line(one: Held) -> str:
 
 
 def hundred_hours(say: Callable[[str], None], hours: int = 100) -> list[Figure]:
-    """What has grown between the first tenth of the hours and the last."""
+    """What has grown between the first tenth of the hours and the last. `hours`: 12 at least, for quiet ends."""
     found = run(hours, say)
     began, first, last = found[0], found[1], found[-1]
     since = f"more than after {first.hour:.0f}"
@@ -261,7 +263,7 @@ def hundred_hours(say: Callable[[str], None], hours: int = 100) -> list[Figure]:
 def main() -> None:
     """Run, print, and fail where memory has grown."""
     hours = int(sys.argv[1]) if len(sys.argv) > 1 else 100
-    print("  hour   tracks   state, kB decoder, kB  others, kB     RSS, MB", flush=True)
+    print(HEADINGS, flush=True)
     figures = hundred_hours(lambda text: print(text, flush=True), hours)
     for figure in figures:
         print(f"{figure.name}: {figure.median:.1f} {figure.unit} ({figure.target})")
