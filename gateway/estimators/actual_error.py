@@ -14,18 +14,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.estimators.kalman import ERROR, SIZE, Innovation
+from gateway.estimators.kalman import ERROR, Innovation
 
 Floats = NDArray[np.float64]
 
-MANOEUVRE_SHARE = 0.1  # of the modes' noise: how much of the manoeuvres that a filter is ready for takes place
+MANOEUVRE_SHARE = 0.02  # of the modes' noise: how much of the manoeuvres that a filter is ready for takes place
 MOST = 2.0  # times what the filter reckons with: beyond it something else has bounded the filter's covariance
-
-_AXES = np.arange(SIZE)
 
 
 def carried_on(error: Floats, weight: Floats, carry: Floats, noise: Floats, share: float = MANOEUVRE_SHARE) -> Floats:
-    """Error covariances (n, 9, 9) later: transition and noise (n, m, 9, 9) of the modes, by their weights (n, m)."""
+    """Error covariances (n, d, d) later: transition and noise (n, m, d, d) of the modes, by their weights (n, m)."""
     by_mode = weight[:, :, None, None]
     moved: Floats = (by_mode * carry).sum(axis=1)
     grown: Floats = (by_mode * noise).sum(axis=1)
@@ -35,16 +33,18 @@ def carried_on(error: Floats, weight: Floats, carry: Floats, noise: Floats, shar
 
 
 def corrected(error: Floats, weight: Floats, told: Innovation, reckoned: Floats) -> Floats:
-    """Error covariances (n, 9, 9) after an update of n m rows, by the modes' weights (n, m) after it.
+    """Error covariances (n, d, d) after an update of n m rows, by the modes' weights (n, m) after it.
 
-    Never more than twice what the filter reckons with, (n, 9, 9): a guessed height, for one, bounds that without a gain.
+    Never more than twice what the filter reckons with, (n, d, d): a guessed height, for one, bounds that without a gain.
     """
     n, m = weight.shape
-    gain = (weight[:, :, None, None] * told.gain.reshape(n, m, SIZE, -1)).sum(axis=1)
+    size = error.shape[-1]
+    axes = np.arange(size)
+    gain = (weight[:, :, None, None] * told.gain.reshape(n, m, size, -1)).sum(axis=1)
     first = np.broadcast_to(told.sensitivity, (n * m, *told.sensitivity.shape[1:]))[::m]
-    kept = np.eye(SIZE) - gain @ first
+    kept = np.eye(size) - gain @ first
     noise = (gain * told.noise[::m, None, :]) @ gain.transpose(0, 2, 1)
     after = kept @ error @ kept.transpose(0, 2, 1) + noise
     after = 0.5 * (after + after.transpose(0, 2, 1))
-    out = (after[:, _AXES, _AXES] > MOST * reckoned[:, _AXES, _AXES]).any(axis=1)
+    out = (after[:, axes, axes] > MOST * reckoned[:, axes, axes]).any(axis=1)
     return np.where(out[:, None, None], reckoned, after)

@@ -130,16 +130,21 @@ def update(
     """One measurement for each of n tracks; components that are NaN in `innovation` (n, m) are left out.
 
     `sensitivity` (n, m, 9) or (1, m, 9) is the measurement's derivative by the state, `variance` (n, m) that of its
-    independent noise. With `robust` (sigmas for each degree of freedom), what lies further out has its noise raised
-    until it is just there (Huber's weight): an outlier pulls no more than a bounded amount, and a source that really has
-    jumped is followed all the same. Rows in groups of `together` are guesses at one track (`modes`): the noise is raised
-    in all of them by what the nearest asks for, so that an outlier does not tell them apart.
+    independent noise. States may have more than nine numbers (`holding`); of the rest nothing is measured.
+
+    With `robust` (sigmas for each degree of freedom), what lies further out has its noise raised until it is just there
+    (Huber's weight): an outlier pulls no more than a bounded amount, and a source that really has jumped is followed.
+    Rows in groups of `together` are guesses at one track (`modes`): the noise is raised in all of them by what the nearest
+    asks for, so that an outlier does not tell them apart.
     Joseph's form: the covariance stays symmetric and positive whatever the rounding.
     Source: 003 2.4 eq 19, 20.
     """
     missing = np.isnan(innovation)
     measured = ~missing
     h, y, r = sensitivity, innovation, variance
+    size = state.mean.shape[1]
+    if h.shape[2] < size:
+        h = np.concatenate([h, np.zeros((*h.shape[:2], size - h.shape[2]))], axis=2)
     if missing.any():
         y, r = np.where(missing, 0.0, y), np.where(missing, 1.0, r)
         h = np.where(missing[:, :, None], 0.0, h)
@@ -170,7 +175,7 @@ def update(
             inverse = np.linalg.inv(s)
     gain = cross @ inverse
     mean = state.mean + (gain @ column)[:, :, 0]
-    reduced = _IDENTITY - gain @ h
+    reduced = _IDENTITIES[size] - gain @ h
     noise = (gain * r[:, None, :]) @ gain.transpose(0, 2, 1)
     covariance = reduced @ state.covariance @ reduced.transpose(0, 2, 1) + noise
     covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))
@@ -178,7 +183,7 @@ def update(
     return Estimate(mean, covariance), told
 
 
-_IDENTITY = np.eye(SIZE)
+_IDENTITIES = {size: np.eye(size) for size in (SIZE, SIZE + 2)}  # `holding` has two numbers more
 _ALONG = np.arange(SIZE)
 
 

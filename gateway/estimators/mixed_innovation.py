@@ -20,7 +20,7 @@ class Told:
     prior: Floats  # (n, m) the modes' weights before it
     each: Innovation  # of every mode, n m rows
     mode_log_likelihood: Floats  # (n, m)
-    error: Floats  # (n, 9, 9) of the mixtures before it, as `actual_error` has it
+    error: Floats  # (n, d, d) of the mixtures before it, as `actual_error` has it
     unmixed: Floats  # (n, m) the weights before the modes mixed
 
     @property
@@ -47,14 +47,19 @@ class Told:
 
         Modes that have not begun are no part of it: they are begun far more often by the filter than by aircraft.
         """
-        m = self.prior.shape[1]
-        first = np.broadcast_to(self.each.sensitivity, (self.prior.size, *self.each.sensitivity.shape[1:]))[::m]
+        first = self.sensitivity
         scatter = first @ self.error @ first.transpose(0, 2, 1)
         along = np.arange(scatter.shape[-1])
-        scatter[:, along, along] += self.each.noise[::m]
+        scatter[:, along, along] += self.each.noise[:: self.prior.shape[1]]
         off = self._shaped(self.each.innovation) - self.innovation[:, None]
         apart = self.unmixed[:, :, None, None] * (off[..., :, None] * off[..., None, :])
         return np.asarray(scatter + apart.sum(axis=1))
+
+    @property
+    def sensitivity(self) -> Floats:
+        """(n, k, d) of the first mode; the modes' own hardly differ."""
+        each = self.each.sensitivity
+        return np.broadcast_to(each, (self.prior.size, *each.shape[1:]))[:: self.prior.shape[1]]
 
     @property
     def outlying(self) -> Bools:

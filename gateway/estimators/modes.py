@@ -20,19 +20,36 @@ residual of exactly 0 would throw out the mode that fits exactly; `literal` boun
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.estimators import lagging
 from gateway.estimators.actual_error import carried_on, corrected
+from gateway.estimators.holding import WIDE, Held, along_the_course, usual, widened
 from gateway.estimators.kalman import SIZE, Estimate, Innovation, Motion
 from gateway.estimators.kalman import update as update_each
 from gateway.estimators.mean_residual import excess, faded, in_metres, mean_size_m
 from gateway.estimators.mixed_innovation import Told
+from gateway.estimators.mixture import Mixture, combine, matched, stacked, stated
 from gateway.estimators.turning import carried
+
+__all__ = [
+    "Mixture",
+    "Mode",
+    "Modes",
+    "Rule",
+    "begin",
+    "combine",
+    "held",
+    "predict",
+    "stacked",
+    "stated",
+    "update",
+    "weigh",
+]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -49,12 +66,15 @@ WINDOW = 5  # residuals that `literal` takes the mean of
 class Mode:
     """One way of moving. `turn` is a multiple of the set's turn rate: 0 is straight, positive to the left.
 
-    `share` is how much of its time an aircraft spends so, against the other modes'.
+    `share` is how much of its time an aircraft spends so, against the other modes'; `along`, of a straight one, how much of
+    the level noise's sigma there is along the course, 1 = as much as across; with `holds` an acceleration lasts.
     """
 
     turn: float
     motion: Motion
     share: float = 1.0
+    along: float = 1.0
+    holds: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +91,7 @@ class Modes:
     turn_rate_rps: float = math.radians(3.0)
     bank_rad: float = math.radians(30.0)
     fade: float = 0.92  # of the residuals' mean, over MEAN_PERIOD_S
+    acceleration: Held | None = None  # that lasts in modes which hold it; with it there are two states more
 
     @property
     def count(self) -> int:
@@ -104,90 +125,27 @@ class Modes:
         return np.asarray(shares / shares.sum())
 
 
-@dataclass(frozen=True, slots=True)
-class Mixture:
-    """n tracks in m modes: mean (n, m, 9), covariance (n, m, 9, 9), weight (n, m), which sums to 1.
-
-    What is remembered of the residuals: their faded score (n, m, 3) with its information (n, m, 3, 3), and for `literal` the
-    last ones in metres (n, m, 5, 3), NaN before they are (for the other rules there is none).
-    """
-
-    mean: Floats
-    covariance: Floats
-    weight: Floats
-    score: Floats
-    information: Floats
-    recent: Floats
-    elapsed_s: Floats  # (n,) since the last measurement
-    error: Floats  # (n, 9, 9) of the combined state, as `actual_error` has it
-    unmixed: Floats  # (n, m) the weights before the modes last mixed
-
-    def each(self) -> Estimate:
-        """The modes' states as n m rows, those of one track together."""
-        return Estimate(self.mean.reshape(-1, SIZE), self.covariance.reshape(-1, SIZE, SIZE))
-
-    def row(self, place: int) -> Mixture:
-        """One of the tracks, as a mixture of one."""
-        one = slice(place, place + 1)
-        return Mixture(
-            self.mean[one],
-            self.covariance[one],
-            self.weight[one],
-            self.score[one],
-            self.information[one],
-            self.recent[one],
-            self.elapsed_s[one],
-            self.error[one],
-            self.unmixed[one],
-        )
-
-
-def stacked(rows: Sequence[Mixture]) -> Mixture:
-    """Mixtures of some tracks as one."""
-    if len(rows) == 1:
-        return rows[0]
-    return Mixture(
-        np.concatenate([row.mean for row in rows]),
-        np.concatenate([row.covariance for row in rows]),
-        np.concatenate([row.weight for row in rows]),
-        np.concatenate([row.score for row in rows]),
-        np.concatenate([row.information for row in rows]),
-        np.concatenate([row.recent for row in rows]),
-        np.concatenate([row.elapsed_s for row in rows]),
-        np.concatenate([row.error for row in rows]),
-        np.concatenate([row.unmixed for row in rows]),
-    )
-
-
 def begin(state: Estimate, modes: Modes) -> Mixture:
     """Mixtures of n tracks that were just started: the modes in their shares."""
     n, m = len(state.mean), modes.count
+    mean, covariance = state.mean, state.covariance
+    if modes.acceleration is not None:
+        mean, covariance = np.zeros((n, WIDE)), np.zeros((n, WIDE, WIDE))
+        mean[:, :SIZE], covariance[:, :SIZE, :SIZE] = state.mean, state.covariance
+        covariance[:, SIZE:, SIZE:] = usual(_course(state.mean[:, 3:5]), modes.acceleration)
     return Mixture(
-        np.repeat(state.mean[:, None], m, axis=1),
-        np.repeat(state.covariance[:, None], m, axis=1),
+        np.repeat(mean[:, None], m, axis=1),
+        np.repeat(covariance[:, None], m, axis=1),
         np.repeat(modes.shares[None], n, axis=0),
         np.zeros((n, m, 3)),
         np.zeros((n, m, 3, 3)),
+        np.zeros((n, 3)),
+        np.zeros((n, 3, 3)),
         np.full((n, m, WINDOW if modes.rule == "literal" else 0, 3), math.nan),
         np.zeros(n),
-        state.covariance.copy(),
+        covariance.copy(),
         np.repeat(modes.shares[None], n, axis=0),
     )
-
-
-def combine(mixture: Mixture) -> Estimate:
-    """One Gaussian a track with the mixture's mean and covariance. Source: 000 2.1.2 eq 14, 15."""
-    mean, covariance = _matched(mixture.weight[:, :, None], mixture.mean, mixture.covariance)
-    return Estimate(mean[:, 0], covariance[:, 0])
-
-
-def stated(mixture: Mixture) -> Estimate:
-    """What is told of each track: the mixture's mean, with the covariance of the error that it really has.
-
-    `combine` has the covariance that the filter reckons with.
-    """
-    mean, spread = _spread(mixture.weight[:, :, None], mixture.mean)
-    return Estimate(mean[:, 0], mixture.error + spread[:, 0])
 
 
 def predict(mixture: Mixture, elapsed_s: Floats, modes: Modes, transition: Floats | None = None) -> Mixture:
@@ -201,23 +159,44 @@ def predict(mixture: Mixture, elapsed_s: Floats, modes: Modes, transition: Float
     weight = joint.sum(axis=1)
     mean, covariance = mixture.mean, mixture.covariance
     if modes.count > 1:
-        mean, covariance = _matched(joint / weight[:, None], mean, covariance)
+        mean, covariance = matched(joint / weight[:, None], mean, covariance)
     carry, noise = moved(mean, weight, elapsed_s, modes)
     mean = (carry @ mean[..., None])[..., 0]
     covariance = carry @ covariance @ carry.swapaxes(-1, -2) + noise
     covariance = 0.5 * (covariance + covariance.swapaxes(-1, -2))
-    passed_s = mixture.elapsed_s + elapsed_s
-    error, before = carried_on(mixture.error, weight, carry, noise), mixture.weight
-    return Mixture(
-        mean, covariance, weight, mixture.score, mixture.information, mixture.recent, passed_s, error, before
+    return replace(
+        mixture,
+        mean=mean,
+        covariance=covariance,
+        weight=weight,
+        elapsed_s=mixture.elapsed_s + elapsed_s,
+        error=carried_on(mixture.error, weight, carry, noise),
+        unmixed=mixture.weight,
     )
 
 
 def moved(mean: Floats, weight: Floats, elapsed_s: Floats, modes: Modes) -> tuple[Floats, Floats]:
-    """Transition and noise (n, m, 9, 9) over times (n,) of modes that have mixed: means (n, m, 9), weights (n, m)."""
+    """Transition and noise (n, m, d, d) over times (n,) of modes that have mixed: means (n, m, d), weights (n, m)."""
     level = (weight[:, None, :] @ mean[:, :, 3:5])[:, 0]
     rate = modes.turn_rate(np.sqrt(level[:, 0] * level[:, 0] + level[:, 1] * level[:, 1]))
-    return carried([mode.motion for mode in modes.modes], elapsed_s, rate)
+    carry, noise = carried([mode.motion for mode in modes.modes], elapsed_s, rate)
+    along = np.array([mode.along for mode in modes.modes])
+    if modes.acceleration is None and (along == 1.0).all():
+        return carry, noise
+    course = _course(level)
+    uneven = np.flatnonzero(along != 1.0)
+    if len(uneven):
+        noise[:, uneven] = along_the_course(noise[:, uneven], course, along[uneven])
+    if modes.acceleration is None:
+        return carry, noise
+    holds = np.array([mode.holds for mode in modes.modes])
+    return widened(carry, noise, elapsed_s, course, modes.acceleration, holds)
+
+
+def _course(level: Floats) -> Floats:
+    """Level velocities (n, 2) as directions of length 1; 0 of what stands."""
+    speed = np.sqrt(level[:, 0] * level[:, 0] + level[:, 1] * level[:, 1])[:, None]
+    return np.where(speed > 0.0, level / np.maximum(speed, 1e-300), 0.0)
 
 
 def held(mixture: Mixture, elapsed_s: Floats, modes: Modes) -> Estimate:
@@ -227,23 +206,7 @@ def held(mixture: Mixture, elapsed_s: Floats, modes: Modes) -> Estimate:
     """
     ahead = predict(mixture, elapsed_s, modes, np.eye(modes.count)[None])
     rows, likeliest = np.arange(len(elapsed_s)), mixture.weight.argmax(axis=1)
-    return Estimate(ahead.mean[rows, likeliest], ahead.covariance[rows, likeliest])
-
-
-def _matched(share: Floats, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
-    """Means (n, j, 9) and covariances (n, j, 9, 9) of the Gaussians that match m ones in shares (n, m, j)."""
-    matched, spread = _spread(share, mean)
-    n, m, j = share.shape
-    within = share.transpose(0, 2, 1) @ covariance.reshape(n, m, SIZE * SIZE)
-    return matched, np.asarray(spread + within.reshape(n, j, SIZE, SIZE))
-
-
-def _spread(share: Floats, mean: Floats) -> tuple[Floats, Floats]:
-    """Means (n, j, 9) of m ones in shares (n, m, j), and how they lie about these, (n, j, 9, 9)."""
-    across = share.transpose(0, 2, 1)
-    middle = across @ mean
-    off = (mean[:, None] - middle[:, :, None]) * np.sqrt(across)[..., None]
-    return middle, off.swapaxes(-1, -2) @ off
+    return Estimate(ahead.mean[rows, likeliest, :SIZE], ahead.covariance[rows, likeliest, :SIZE, :SIZE])
 
 
 def update(
@@ -283,8 +246,29 @@ def weigh(mixture: Mixture, after: Estimate, told: Innovation, modes: Modes) -> 
     weight = np.exp(log - log.max(axis=1, keepdims=True))
     weight = np.maximum(weight / weight.sum(axis=1, keepdims=True), LEAST_WEIGHT)
     weight /= weight.sum(axis=1, keepdims=True)
-    mean, covariance = after.mean.reshape(n, m, SIZE), after.covariance.reshape(n, m, SIZE, SIZE)
-    _, reckoned = _matched(weight[:, :, None], mean, covariance)
+    mean, covariance = after.mean.reshape(n, m, -1), after.covariance.reshape(mixture.covariance.shape)
+    _, reckoned = matched(weight[:, :, None], mean, covariance)
+    whole = Told(mixture.weight, told, likelihood, mixture.error, mixture.unmixed)
+    whole_score, whole_information = lagging.faded(
+        mixture.whole_score,
+        mixture.whole_information,
+        whole.innovation,
+        whole.scatter,
+        whole.sensitivity,
+        mixture.elapsed_s,
+    )
     error = corrected(mixture.error, weight, told, reckoned[:, 0])
-    mixture_after = Mixture(mean, covariance, weight, score, information, recent, np.zeros(n), error, weight)
-    return mixture_after, Told(mixture.weight, told, likelihood, mixture.error, mixture.unmixed)
+    mixture_after = Mixture(
+        mean,
+        covariance,
+        weight,
+        score,
+        information,
+        whole_score,
+        whole_information,
+        recent,
+        np.zeros(n),
+        error,
+        weight,
+    )
+    return mixture_after, whole

@@ -34,6 +34,7 @@ from gateway.estimators.kalman import ERROR, SIZE, Estimate, Motion, carried
 from gateway.estimators.modes import Modes, moved
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 AT_ONCE = 512  # instants x tracks whose transitions are worked out together: bounds memory
 LEAST_INFORMATION = 1e-9  # of the future, in units of what is predicted: less is rounding
@@ -43,14 +44,14 @@ LEAST_PAIR = 1e-12  # of a pair of modes, against the filter's own weight: none 
 
 @dataclass(frozen=True, slots=True)
 class States:
-    """t instants of n tracks in m modes: mean (t, n, m, 9), covariance (t, n, m, 9, 9), weight (t, n, m), which sums to 1."""
+    """t instants of n tracks in m modes: mean (t, n, m, d), covariance (t, n, m, d, d), weight (t, n, m), which sums to 1."""
 
     mean: Floats
     covariance: Floats
     weight: Floats
 
     def combined(self) -> Estimate:
-        """One Gaussian an instant and track, with the mixture's mean and covariance: (t, n, 9) and (t, n, 9, 9)."""
+        """One Gaussian an instant and track, with the mixture's mean and covariance: (t, n, d) and (t, n, d, d)."""
         mean = (self.weight[..., None, :] @ self.mean)[..., 0, :]
         off = self.mean - mean[..., None, :]
         spread = self.covariance + off[..., :, None] * off[..., None, :]
@@ -70,28 +71,37 @@ def smooth(filtered: States, elapsed_s: Floats, how: Motion | Modes, later: Stat
     """
     motions = [how] if isinstance(how, Motion) else [mode.motion for mode in how.modes]
     # Without an error allowed its covariance is zero, and no prediction could be divided by.
-    size = SIZE if any(motion.error_sigma_m for motion in motions) else ERROR.start
+    live = np.arange(filtered.mean.shape[-1])
+    if not any(motion.error_sigma_m for motion in motions):
+        live = np.delete(live, ERROR)
     mean, covariance, weight = filtered.mean.copy(), filtered.covariance.copy(), filtered.weight.copy()
     if later is not None:
         mean[-1:], covariance[-1:], weight[-1:] = later.mean, later.covariance, later.weight
-    smoothed = States(mean[..., :size], covariance[..., :size, :size], weight)
+    smoothed = States(mean[..., live], _among(covariance, live), weight)
     steps, tracks = elapsed_s.shape
     piece = max(AT_ONCE // max(tracks, 1), 1)
     for end in range(steps, 0, -piece):
         begin = max(end - piece, 0)
         before, times = filtered.between(begin, end), elapsed_s[begin:end]
         if isinstance(how, Motion):
-            _one_model(smoothed, begin, before, times, how, size)
+            _one_model(smoothed, begin, before, times, how, live)
         else:
-            _many_modes(smoothed, begin, before, times, how, size)
+            _many_modes(smoothed, begin, before, times, how, live)
+    mean[..., live], covariance[..., live[:, None], live] = smoothed.mean, smoothed.covariance
     return States(mean, covariance, weight)
 
 
-def _one_model(smoothed: States, begin: int, before: States, elapsed_s: Floats, motion: Motion, size: int) -> None:
+def _among(matrix: Floats, live: Ints) -> Floats:
+    """The rows and columns of some states."""
+    return matrix[..., live[:, None], live]
+
+
+def _one_model(smoothed: States, begin: int, before: States, elapsed_s: Floats, motion: Motion, live: Ints) -> None:
     """Smooth some instants of one mode in place; the one after them is smoothed already."""
     shape = elapsed_s.shape
-    carry, noise = (part.reshape(*shape, SIZE, SIZE)[..., :size, :size] for part in carried(motion, elapsed_s.ravel()))
-    mean, covariance = before.mean[:, :, 0, :size], before.covariance[:, :, 0, :size, :size]
+    steps = carried(motion, elapsed_s.ravel())
+    carry, noise = (_among(part.reshape(*shape, SIZE, SIZE), live) for part in steps)
+    mean, covariance = before.mean[:, :, 0, live], _among(before.covariance[:, :, 0], live)
     gain, rest, _ = _back(covariance, carry, noise)
     ahead = (carry @ mean[..., None])[..., 0]
     for step in range(len(elapsed_s) - 1, -1, -1):
@@ -133,17 +143,18 @@ class _Pairs:
     rest: Floats  # (t, n, i, j, 9, 9)
 
 
-def _pairs(before: States, elapsed_s: Floats, modes: Modes, size: int) -> _Pairs:
+def _pairs(before: States, elapsed_s: Floats, modes: Modes, live: Ints) -> _Pairs:
     shape, m = elapsed_s.shape, modes.count
     joint = before.weight[..., :, None] * modes.transition(elapsed_s.ravel()).reshape(*shape, m, m)
     weight = joint.sum(axis=-2)
     share = (joint / weight[..., None, :]).swapaxes(-1, -2)  # i, j
-    mixed = (share @ before.mean).reshape(-1, m, SIZE)
+    whole, size = before.mean.shape[-1], len(live)
+    mixed = (share @ before.mean).reshape(-1, m, whole)
     steps = moved(mixed, weight.reshape(-1, m), elapsed_s.ravel(), modes)
-    carry, noise = (part.reshape(*shape, m, 1, SIZE, SIZE)[..., :size, :size] for part in steps)
-    covariance = before.covariance[:, :, None, :, :size, :size]
+    carry, noise = (_among(part.reshape(*shape, m, 1, whole, whole), live) for part in steps)
+    covariance = _among(before.covariance[:, :, None], live)
     gain, rest, spread = _back(covariance, carry, np.broadcast_to(noise, (*shape, m, m, size, size)))
-    ahead = (carry @ before.mean[:, :, None, :, :size, None])[..., 0]
+    ahead = (carry @ before.mean[:, :, None][..., live, None])[..., 0]
     middle, joined = _joined(share, ahead, spread)
     root = _root(joined)
     unit = np.asarray(np.linalg.solve(root, np.broadcast_to(np.eye(size), root.shape)), dtype=np.float64)
@@ -170,9 +181,9 @@ def _joined(share: Floats, mean: Floats, covariance: Floats) -> tuple[Floats, Fl
     return joined, (share[..., None, None] * spread).sum(axis=-3)
 
 
-def _many_modes(smoothed: States, begin: int, before: States, elapsed_s: Floats, modes: Modes, size: int) -> None:
+def _many_modes(smoothed: States, begin: int, before: States, elapsed_s: Floats, modes: Modes, live: Ints) -> None:
     """Smooth some instants of several modes in place; the one after them is smoothed already."""
-    pairs = _pairs(before, elapsed_s, modes, size)
+    pairs = _pairs(before, elapsed_s, modes, live)
     for step in range(len(elapsed_s) - 1, -1, -1):
         at, unit = begin + step, pairs.unit[step]
         moved_off = (unit @ (smoothed.mean[at + 1] - pairs.middle[step])[..., None])[..., 0]
@@ -181,7 +192,7 @@ def _many_modes(smoothed: States, begin: int, before: States, elapsed_s: Floats,
         off, spread, fit = _told(pairs.off[step], pairs.spread[step], root[..., None, :, :], seen[..., None, :])
         weight = _weights(pairs.log_share[step], fit, smoothed.weight[at + 1])
         gain = pairs.gain[step]
-        mean = before.mean[step][:, None, :, :size] + (gain @ (off - pairs.off[step])[..., None])[..., 0]
+        mean = before.mean[step][:, None][..., live] + (gain @ (off - pairs.off[step])[..., None])[..., 0]
         covariance = pairs.rest[step] + gain @ spread @ gain.swapaxes(-1, -2)
         total = weight.sum(axis=-2)
         share = (weight / total[..., None, :]).swapaxes(-1, -2)  # j, i

@@ -18,11 +18,9 @@ from gateway.estimators import modes
 from gateway.estimators.kalman import SIZE, Estimate, Innovation, predict
 from gateway.estimators.modes import Mixture, Modes
 from gateway.fuse.events import Belief, Event, Measure, Near
+from gateway.fuse.starting import start_from_fixes, start_from_plots, start_in_part
 from gateway.fuse.weighting import (
     Model,
-    start_from_fixes,
-    start_from_plots,
-    start_in_part,
     update_in_part,
     update_literally,
     update_with_fixes,

@@ -10,24 +10,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gateway.align import Local
 from gateway.estimators.alpha_beta_gamma import Tuning
-from gateway.estimators.kalman import ERROR, POSITION, SIZE, VELOCITY, Estimate, Innovation, Motion, start, update
-from gateway.estimators.modes import Mode, Modes
-from gateway.frames import RadarFrame, polar_from_xyz, polar_jacobian, xyz_from_polar
+from gateway.estimators.kalman import ERROR, POSITION, SIZE, VELOCITY, Estimate, Innovation, Motion, update
+from gateway.estimators.modes import Modes
+from gateway.frames import RadarFrame, polar_from_xyz, polar_jacobian
+from gateway.fuse.flying import modes_of
 from gateway.settings import Estimation, Options, PositionSource, Weighting
 
 Floats = NDArray[np.float64]
 
 ROBUST_SIGMA = 3.0  # beyond this (for each degree of freedom) a measurement's pull is bounded
-START_SPEED_SIGMA_MPS = 100.0  # before anything is known of a velocity
 WINDOW = 8  # innovations remembered by `innovation`
-ACCELERATES_S = 1.0  # accelerations of modes are white over a second
 LEAST_RESIDUAL = 1e-3  # sigmas; the literal weights are singular at a residual of 0
 
 # Three sigmas for each degree of freedom, for the three of a position: all of them may lie in one axis.
@@ -77,75 +76,6 @@ class Model:
     def memory(self) -> int:
         """How many innovations each track remembers."""
         return WINDOW if self.weighting == "innovation" else 0
-
-
-def modes_of(options: Options, motion: Motion, fly: Estimation) -> Modes | None:
-    """The set of modes that the options ask for, as the site has them, or None for the one of `motion`.
-
-    Straight flight comes in two: calm, in which noise is taken off best, and with changes of speed, climb or course that are
-    no full turn.
-    """
-    if options.estimator == "kalman" or options.estimator == "alpha-beta-gamma":
-        return None
-
-    def way(turn: float, level_mps2: float, upright_mps2: float, share: float) -> Mode:
-        level, upright = level_mps2**2 * ACCELERATES_S, upright_mps2**2 * ACCELERATES_S
-        return Mode(turn, replace(motion, acceleration_density=(level, level, upright)), share)
-
-    ways = (
-        way(0.0, fly.calm_acceleration_mps2, fly.calm_acceleration_mps2, fly.calm_share),
-        way(0.0, fly.manoeuvre_acceleration_mps2, fly.manoeuvre_vertical_acceleration_mps2, fly.manoeuvre_share),
-        way(1.0, fly.turn_acceleration_mps2, fly.turn_acceleration_mps2, 0.5 * fly.turn_share),
-        way(-1.0, fly.turn_acceleration_mps2, fly.turn_acceleration_mps2, 0.5 * fly.turn_share),
-    )
-    return Modes(ways, options.estimator, fly.mode_lasts_s, fly.turn_rate_rps, fly.bank_rad)
-
-
-def start_from_fixes(
-    position: Floats, sigma: Floats, velocity: Floats, velocity_sigma: Floats, model: Model
-) -> Estimate:
-    """First states from GPS reports: positions, sigmas, velocities (n, 3; NaN = not measured), their sigma (n,).
-
-    Position and source error are the two parts of one measured sum: their errors are opposite.
-    """
-    unknown: NDArray[np.bool_] = np.asarray(np.isnan(velocity).any(axis=1))
-    speed_sigma = np.where(unknown, START_SPEED_SIGMA_MPS, velocity_sigma)
-    covariance = np.zeros((len(position), 3, 3))
-    axis, error = np.arange(3), model.motion.error_sigma_m
-    covariance[:, axis, axis] = sigma * sigma + error * error
-    state = start(position, covariance, np.where(unknown[:, None], 0.0, velocity), speed_sigma, error)
-    state.covariance[:, axis, axis + 6] -= error * error
-    state.covariance[:, axis + 6, axis] -= error * error
-    return state
-
-
-def start_in_part(position: Floats, sigma: Floats, local: Local, velocity_sigma: Floats, model: Model) -> Estimate:
-    """The first state from a report that lacks components: position and sigma (1, 3), sigma of the velocity (1,).
-
-    What is missing of the velocity is unknown; a height that is only guessed says nothing of the source's error.
-    """
-    axes, error = local.from_enu, model.motion.error_sigma_m
-    unknown = np.isnan(local.velocity_mps)
-    velocity = axes.T @ np.where(unknown, 0.0, local.velocity_mps)
-    speed_sigma = np.where(unknown, START_SPEED_SIGMA_MPS, velocity_sigma)
-    wrong = axes.T @ np.diag([error * error, error * error, error * error * local.has_height]) @ axes
-    covariance = axes.T @ np.diag(sigma[0] * sigma[0]) @ axes + wrong
-    state = start(position, covariance[None], velocity[None], velocity_sigma, error)
-    state.covariance[:, VELOCITY, VELOCITY] = axes.T @ np.diag(speed_sigma * speed_sigma) @ axes
-    state.covariance[:, POSITION, ERROR] = state.covariance[:, ERROR, POSITION] = -wrong
-    return state
-
-
-def start_from_plots(polar: Floats, sigma: Floats, radar: int, model: Model) -> Estimate:
-    """First states from complete plots of one radar: range m, azimuth rad, elevation rad and sigmas, (n, 3)."""
-    frame = model.radars[radar]
-    xyz = xyz_from_polar(polar)
-    outwards = np.linalg.inv(polar_jacobian(xyz))
-    local = (outwards * (sigma * sigma)[:, None, :]) @ outwards.transpose(0, 2, 1)
-    covariance = frame.enu_from_radar @ local @ frame.radar_from_enu
-    n = len(polar)
-    speed_sigma = np.full(n, START_SPEED_SIGMA_MPS)
-    return start(frame.to_enu(xyz), covariance, np.zeros((n, 3)), speed_sigma, model.motion.error_sigma_m)
 
 
 def update_with_fixes(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND
 from gateway.estimators import kalman, modes
-from gateway.estimators.kalman import SIZE, Estimate
+from gateway.estimators.kalman import Estimate
 from gateway.estimators.modes import Mixture
 from gateway.fuse import Fused, Settled
 from gateway.fuse.events import Event
@@ -39,8 +39,8 @@ class Piece:
     rows: Fused
     step: Ints  # (n,) of the picture that wrote each
     begins: Bools  # (n,) whether the filter began, or began anew, here: nothing leads from the state before
-    mean: Floats  # (n, m, 9)
-    covariance: Floats  # (n, m, 9, 9)
+    mean: Floats  # (n, m, d)
+    covariance: Floats  # (n, m, d, d)
     weight: Floats  # (n, m)
 
     @property
@@ -197,9 +197,9 @@ def _in_order(
 
 
 def arrays_of(states: Sequence[Estimate | Mixture]) -> tuple[Floats, Floats, Floats]:
-    """Means (n, m, 9), covariances (n, m, 9, 9) and weights (n, m) of some states by mode."""
-    mean = np.array([state.mean.reshape(-1, SIZE) for state in states])
-    covariance = np.array([state.covariance.reshape(-1, SIZE, SIZE) for state in states])
+    """Means (n, m, d), covariances (n, m, d, d) and weights (n, m) of some states by mode."""
+    mean = np.array([state.mean.reshape(-1, state.mean.shape[-1]) for state in states])
+    covariance = np.array([state.covariance.reshape(-1, *state.covariance.shape[-2:]) for state in states])
     weight = np.array([state.weight[0] if isinstance(state, Mixture) else (1.0,) for state in states])
     return mean, covariance, weight
 

@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 Units = Literal["si", "aviation"]
+PlotNumbers = Literal["used", "ignored"]
+
+SLOWEST_MPS = 25.0  # an aircraft that lands; birds and rain, with the wind, are slower
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,25 +70,35 @@ class RadarSite:
     azimuth_error_rad: float = 0.0
     elevation_error_rad: float = 0.0
     time_error_s: float = 0.0
+    numbers: PlotNumbers = "used"  # "ignored": it numbers its plots badly, they are tracked as if it did not
+    period_s: float | None = None  # of a scan; None: as its status says
+    clutter_per_scan: float | None = None  # plots; None: learnt from its scans
+    detection_probability: float | None = None  # of a target in a scan; None: learnt from its scans
+    slowest_mps: float = SLOWEST_MPS  # no track of unnumbered plots is told before it surely flies faster
 
 
 @dataclass(frozen=True, slots=True)
 class Estimation:
     """How aircraft fly, for the estimators of several modes; nobody has to tune it between drones and jets.
 
-    Accelerations are white over a second, on each axis. Shares are of an aircraft's time, against each other.
+    Accelerations are white over a second, but for the one that lasts. Shares are of an aircraft's time, against each other.
     """
 
-    calm_acceleration_mps2: float = 0.15
-    manoeuvre_acceleration_mps2: float = 1.8  # straight, with changes of speed or course that are no full turn
-    manoeuvre_vertical_acceleration_mps2: float = 0.5
+    calm_acceleration_mps2: float = 0.15  # along the course and upright
+    calm_across_acceleration_mps2: float = 1.0  # courses wander more than speeds
+    lasting_acceleration_mps2: float = 0.15  # along the course: braking
+    lasting_across_acceleration_mps2: float = 1.0  # swinging onto a course
+    lasting_for_s: float = 40.0
+    manoeuvre_acceleration_mps2: float = 3.0  # straight, with changes of speed or course that are no full turn
+    manoeuvre_vertical_acceleration_mps2: float = 3.0
     turn_acceleration_mps2: float = 1.0
     turn_rate_rps: float = math.radians(3.0)
     bank_rad: float = math.radians(25.0)  # slow aircraft turn faster: as a level turn at this bank
     calm_share: float = 50.0
-    manoeuvre_share: float = 2.0
-    turn_share: float = 6.0  # both sides together
-    mode_lasts_s: float = 5.0  # mean time until the mode is drawn anew, by the shares
+    lasting_share: float = 60.0
+    manoeuvre_share: float = 4.0
+    turn_share: float = 12.0  # both sides together
+    mode_lasts_s: float = 9.0  # mean time until the mode is drawn anew, by the shares
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 
-from gateway.settings.site import Estimation, PositionSource, RadarSite, Runway, Site, Weather
+from gateway.settings.site import SLOWEST_MPS, Estimation, PositionSource, RadarSite, Runway, Site, Weather
 
 
 def format_site(site: Site) -> str:
@@ -52,32 +52,28 @@ def _position(position: PositionSource) -> list[str]:
     ]
 
 
+_ACCELERATIONS = (
+    ("calm_acceleration_mps2", "along the course and upright"),
+    ("calm_across_acceleration_mps2", ""),
+    ("lasting_acceleration_mps2", "along the course: braking"),
+    ("lasting_across_acceleration_mps2", "swinging onto a course"),
+    ("lasting_for_s", ""),
+    ("manoeuvre_acceleration_mps2", "no full turn"),
+    ("manoeuvre_vertical_acceleration_mps2", ""),
+    ("turn_acceleration_mps2", "beside the turn's own"),
+)
+"""Of `Estimation`, in the file's order: what is the same in the file and inside, and what is said of it."""
+
+
 def _estimation(chosen: Estimation) -> list[str]:
     """What is as it is by default stands in comments, so that a site follows better defaults of a later release."""
     usual = Estimation()
     rows = (
-        ("calm_acceleration_mps2", chosen.calm_acceleration_mps2, usual.calm_acceleration_mps2, ""),
-        (
-            "manoeuvre_acceleration_mps2",
-            chosen.manoeuvre_acceleration_mps2,
-            usual.manoeuvre_acceleration_mps2,
-            "no full turn",
-        ),
-        (
-            "manoeuvre_vertical_acceleration_mps2",
-            chosen.manoeuvre_vertical_acceleration_mps2,
-            usual.manoeuvre_vertical_acceleration_mps2,
-            "",
-        ),
-        (
-            "turn_acceleration_mps2",
-            chosen.turn_acceleration_mps2,
-            usual.turn_acceleration_mps2,
-            "beside the turn's own",
-        ),
+        *((name, getattr(chosen, name), getattr(usual, name), says) for name, says in _ACCELERATIONS),
         ("turn_rate_degps", math.degrees(chosen.turn_rate_rps), math.degrees(usual.turn_rate_rps), ""),
         ("bank_deg", math.degrees(chosen.bank_rad), math.degrees(usual.bank_rad), "slow aircraft turn as at this bank"),
         ("calm_share", chosen.calm_share, usual.calm_share, "of an aircraft's time, against the others"),
+        ("lasting_share", chosen.lasting_share, usual.lasting_share, ""),
         ("manoeuvre_share", chosen.manoeuvre_share, usual.manoeuvre_share, ""),
         ("turn_share", chosen.turn_share, usual.turn_share, "both sides"),
         ("mode_lasts_s", chosen.mode_lasts_s, usual.mode_lasts_s, ""),
@@ -108,6 +104,14 @@ def _radar(radar: RadarSite) -> list[str]:
         ("time_error_ms", 1e3 * radar.time_error_s, "stamps late by"),
     )
     lines += [f"{f'{key} = {value:.6g}':<40s}# {says}" for key, value, says in errors if value]
+    given = (
+        ("period_s", radar.period_s, "of a scan"),
+        ("clutter_per_scan", radar.clutter_per_scan, "plots"),
+        ("detection_probability", radar.detection_probability, "of a target in a scan"),
+        ("slowest_mps", None if radar.slowest_mps == SLOWEST_MPS else radar.slowest_mps, "an aircraft"),
+    )
+    lines += [f"{f'{key} = {value:.6g}':<40s}# {says}" for key, value, says in given if value is not None]
+    lines += ['numbers = "ignored"'] if radar.numbers == "ignored" else []
     return [*lines, f"key_file = {_quoted(radar.key_file)}"] if radar.key_file else lines
 
 

@@ -17,7 +17,8 @@ from scipy.stats import chi2
 
 from gateway.estimators import modes
 from gateway.estimators.kalman import Estimate, Innovation, predict
-from gateway.fuse.weighting import Model, start_from_fixes, update_with_fixes, update_with_plots
+from gateway.fuse.starting import start_from_fixes
+from gateway.fuse.weighting import Model, update_with_fixes, update_with_plots
 from gateway.settings import Estimation, EstimatorName, Options
 from sim.studies import Progress, Study, Table, silent
 from sim.studies.ensembles import Ensemble, Step, approach, traffic, two_turns

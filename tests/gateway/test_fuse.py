@@ -13,11 +13,10 @@ from gateway.estimators.kalman import ERROR, POSITION, VELOCITY, Estimate
 from gateway.frames import polar_from_xyz, xyz_from_polar
 from gateway.fuse.filtering import Event, Job, run
 from gateway.fuse.placing import begin
+from gateway.fuse.starting import start_from_fixes, start_from_plots
 from gateway.fuse.weighting import (
     Model,
     polar_difference,
-    start_from_fixes,
-    start_from_plots,
     update_literally,
     update_with_fixes,
     update_with_plots,

@@ -1,0 +1,113 @@
+"""Straight motion with an acceleration that lasts, as two states more: east and north, after the nine of `kalman`.
+
+Braking goes on for minutes, and so does swinging onto a course. A mode without an acceleration lags behind either, always to
+the same side, and says nothing of it. A mode that holds one has it die away with a time constant, shaken by white noise that
+keeps its variance (Singer's model). In every other mode it is drawn anew all the time, so that who changes into the mode
+begins with what is usual. Across the course aircraft accelerate more than along it: noise may be told for both.
+
+Arrays are over n tracks and m modes, as in `modes`. Source: 000 2.1.1; R. Singer (1970), eq 8.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.estimators.kalman import SIZE
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+WIDE = SIZE + 2
+LONG = 1.0  # time constants: beyond it the closed form keeps its digits, below it eight points integrate exactly
+
+_LEVEL = (slice(0, 2), slice(3, 5), slice(SIZE, WIDE))  # position, velocity and acceleration, east and north
+_POINTS, _SHARES = (0.5 * part for part in np.polynomial.legendre.leggauss(8))
+_POINTS = _POINTS + 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """Accelerations that last: how large they usually are, 1 sigma, and the time constant with which they die away."""
+
+    across_mps2: float
+    along_mps2: float
+    lasts_s: float
+
+
+def along_the_course(noise: Floats, course: Floats, share: Floats) -> Floats:
+    """Noise (n, m, 9, 9) that is alike on both level axes, with a share (m,) of its sigma along courses (n, 2) of length 1.
+
+    A course of 0, of an aircraft that stands, leaves it alike.
+    """
+    turned = _turned(course, share)
+    found = noise.copy()
+    for place, rows in enumerate(_LEVEL[:2]):
+        for columns in _LEVEL[: place + 1]:
+            block = noise[..., rows.start, columns.start, None, None] * turned
+            found[..., rows, columns] = found[..., columns, rows] = block
+    return found
+
+
+def widened(
+    carry: Floats, noise: Floats, elapsed_s: Floats, course: Floats, held: Held, holds: Bools
+) -> tuple[Floats, Floats]:
+    """Transition and noise (n, m, 11, 11) from those of nine states over times (n,), for modes (m,) that hold or do not."""
+    n, m = carry.shape[:2]
+    wide, shaken = np.zeros((n, m, WIDE, WIDE)), np.zeros((n, m, WIDE, WIDE))
+    wide[..., :SIZE, :SIZE], shaken[..., :SIZE, :SIZE] = carry, noise
+    place, speed, kept = _response(elapsed_s, held.lasts_s)
+    for axis in (0, 1):
+        wide[:, holds, axis, SIZE + axis] = place[:, None]
+        wide[:, holds, 3 + axis, SIZE + axis] = speed[:, None]
+        wide[:, holds, SIZE + axis, SIZE + axis] = kept[:, None]
+    sigma2 = held.across_mps2**2
+    turned = _turned(course, np.array([held.along_mps2 / held.across_mps2]))
+    grown = sigma2 * _grown(elapsed_s, held.lasts_s)
+    for row, rows in enumerate(_LEVEL):
+        for column, columns in enumerate(_LEVEL):
+            shaken[:, holds, rows, columns] += grown[:, row, column, None, None, None] * turned
+    shaken[:, ~holds, SIZE:, SIZE:] = sigma2 * turned
+    return wide, shaken
+
+
+def usual(course: Floats, held: Held) -> Floats:
+    """Covariance (n, 2, 2) of an acceleration of which nothing is known, at courses (n, 2)."""
+    return held.across_mps2**2 * _turned(course, np.array([held.along_mps2 / held.across_mps2]))[:, 0]
+
+
+def _turned(course: Floats, share: Floats) -> Floats:
+    """The identity (n, m, 2, 2) with variance share^2 along the course, shares (m,)."""
+    along = course[:, None, :, None] * course[:, None, None, :]
+    return np.asarray(np.eye(2) + (share * share - 1.0)[:, None, None] * along)
+
+
+def _response(elapsed_s: Floats, lasts_s: float) -> tuple[Floats, Floats, Floats]:
+    """What an acceleration of 1 adds to position and velocity over times (...), and what is left of it."""
+    x = elapsed_s / lasts_s
+    lost = np.expm1(-x)
+    return lasts_s * lasts_s * (lost + x), lasts_s * -lost, 1.0 + lost
+
+
+def _grown(elapsed_s: Floats, lasts_s: float) -> Floats:
+    """Covariance (n, 3, 3) of position, velocity, acceleration that the noise of an acceleration of variance 1 makes."""
+    t = np.minimum(elapsed_s, LONG * lasts_s)[:, None]
+    response = np.stack(_response(t * _POINTS, lasts_s), axis=1)
+    found: Floats = (response * (2.0 / lasts_s * t * _SHARES)[:, None]) @ response.transpose(0, 2, 1)
+    long = elapsed_s > LONG * lasts_s
+    if long.any():
+        found[long] = _grown_long(elapsed_s[long] / lasts_s, lasts_s)
+    return found
+
+
+def _grown_long(x: Floats, lasts_s: float) -> Floats:
+    once, twice = np.exp(-x), np.exp(-2.0 * x)
+    place = 1.0 - twice + 2.0 * x + x * x * (2.0 / 3.0 * x - 2.0) - 4.0 * x * once
+    both = twice + 1.0 - 2.0 * once + 2.0 * x * once - 2.0 * x + x * x
+    first = np.stack([place, both, 1.0 - twice - 2.0 * x * once], axis=-1)
+    second = np.stack([both, 4.0 * once - 3.0 - twice + 2.0 * x, twice + 1.0 - 2.0 * once], axis=-1)
+    third = np.stack([first[:, 2], second[:, 2], 1.0 - twice], axis=-1)
+    scale = lasts_s ** np.array([2.0, 1.0, 0.0])
+    return np.stack([first, second, third], axis=1) * scale[:, None] * scale
