@@ -33,6 +33,7 @@ class Making:
         self.now, self.instant, self.serial = state.now, state.instant, state.serial
         self.counters, self.said, self.reported = dict(state.counters), state.said, state.reported
         self.consistency, self.predicting = state.consistency, state.predicting
+        self.unnumbered = state.unnumbered
         self.history = int(state.options.history_s * SECOND)
         self.wait = int(state.options.association_wait_s * SECOND)
         self.events: list[Event] = []
@@ -130,6 +131,7 @@ class Making:
             self.reported,
             self.consistency,
             self.predicting,
+            self.unnumbered,
         )
         observations = tuple(observation for arrival in self.heard for observation in arrival.observations)
         own = SourceHealth("gateway", "pipeline", 0.0, 0.0, 0, tuple(sorted(self.counters.items())))

@@ -7,8 +7,7 @@ from dataclasses import replace
 from typing import Literal
 
 from gateway import associate, fuse, predict, track
-from gateway.align import SECOND, Fix, Plot
-from gateway.arriving import Arriving
+from gateway.align import SECOND, Fix
 from gateway.associate import Association
 from gateway.fuse import Lane, LifeChange
 from gateway.fuse.consistency import Finding
@@ -17,13 +16,11 @@ from gateway.observation import Heard
 from gateway.picture import Event
 from gateway.register import WAIT_NS, gathered, remaining, residuals
 from gateway.track import Key, RadarTracks
+from gateway.tracking import Tracked, Tracking
 
 PLOT_MARGIN_S = 4.0  # plots are remembered this much longer than reports: a report's check looks back over them
 
-Tracked = list[tuple[Plot, Key]]
-
-
-class Work(Arriving):
+class Work(Tracking):
     """The stages of one step; lives only inside `pipeline.step`, which calls them in order for each arrival."""
 
     # what happens by itself ---------------------------------------------------------------------------------------
@@ -40,6 +37,7 @@ class Work(Arriving):
         due = self._next_check()
         while (at := min(self.instant, due)) < now or (at == now and watermark):
             self.now = max(at, self.now or at)
+            self._track_due()
             self._check_due()
             if at == self.instant:
                 self._live_until(at)
@@ -78,6 +76,7 @@ class Work(Arriving):
         self.settled += fuse.settled(was, self.lanes)
         self.predicting = self.predicting.forgotten(self.lanes.lanes, self.lanes.by_aircraft, at)
         self.tracks = self.tracks.pruned(before - int(PLOT_MARGIN_S * SECOND))
+        self.unnumbered = self.unnumbered.pruned(before)
         self.lanes = fuse.remembered(self.lanes, self.tracks, self._spans)
         gone = associate.missing(self.association, self.tracks)
         for key, aircraft in self.association.ledger.pairs.items():
@@ -113,22 +112,10 @@ class Work(Arriving):
         self.settled += fuse.settled(was, self.lanes)
         self.ended += ended
         self.tracks, self.association = RadarTracks(), Association()
+        self.unnumbered = self.unnumbered.emptied()
         self.registration = self.registration.again(now)
         # An arrival stamped at a whole second comes before what happens at that second.
         self.now, self.instant = now, (now - 1) // SECOND * SECOND + SECOND
-
-    # track --------------------------------------------------------------------------------------------------------
-
-    def track(self, plots: Sequence[Plot]) -> Tracked:
-        """The plots that the radar numbered, each with its radar track."""
-        tracked = []
-        for plot in plots:
-            if plot.number == 0 or not self.tracks.has_room(plot):
-                self.untracked += 1
-                continue
-            self.tracks, key = self.tracks.after(plot)
-            tracked.append((plot, key))
-        return tracked
 
     # associate ----------------------------------------------------------------------------------------------------
 
@@ -141,8 +128,21 @@ class Work(Arriving):
         self._check_due()
 
     def _next_check(self) -> int:
-        due = self.association.due
-        return 1 << 63 if due is None else due.at + self.wait
+        due, scan = self.association.due, self.unnumbered.due
+        return min(1 << 63 if due is None else due.at + self.wait, 1 << 63 if scan is None else scan)
+
+    def _track_due(self) -> None:
+        """The unnumbered plots whose wait is over: those of confirmed tracks go on as numbered ones do."""
+        if self.unnumbered.due is None or self.unnumbered.due > (self.now or 0):
+            return
+        told, back = self.due_tracks()
+        for plot, key in back:
+            self._settle()
+            self._move(associate.check_again(self.association, plot, key, self.tracks, self.setting))
+            self._work_in(*fuse.give_back(self.lanes, plot, key, self._scene()))
+            self._settle()
+        self.associate((), told)
+        self.fuse((), told)
 
     def _check_due(self) -> None:
         """The checks whose wait is over."""

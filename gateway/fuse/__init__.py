@@ -10,7 +10,7 @@ from gateway.fuse.continuing import adopted_earlier, continued, reviewed, spans_
 from gateway.fuse.joints import Regrouped, radar_tracks_of_aircraft, regrouped, remembered
 from gateway.fuse.lanes import Adopted, Ended, Joint, Lane, Lanes, contains, emptied, joined
 from gateway.fuse.life import LifeChange, end_silent, sentence, told
-from gateway.fuse.placing import Scene, lane_of, reroute, take_fix, take_plot
+from gateway.fuse.placing import Scene, give_back, lane_of, reroute, take_fix, take_plot
 from gateway.fuse.rows import Fused, Row, coast, knows_height, table, work
 from gateway.fuse.settled import Settled, remaining, settled
 
@@ -32,6 +32,7 @@ __all__ = [
     "continued",
     "emptied",
     "end_silent",
+    "give_back",
     "joined",
     "knows_height",
     "lane_of",

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from gateway.align import SECOND, Fix, Plot, bracket
 from gateway.associate import Spans, aircraft_of, ordinal_of
 from gateway.fuse.filtering import Job, Measure, Near, Neighbour, rank
-from gateway.fuse.lanes import Lane, Lanes
+from gateway.fuse.lanes import Lane, Lanes, contains
 from gateway.fuse.life import lane_of_report
 from gateway.settings import Options
 from gateway.track import Key, RadarTracks, name_of
@@ -116,6 +116,14 @@ def reroute(lanes: Lanes, old: Spans, scene: Scene) -> tuple[Lanes, list[Job]]:
             lanes, begun = _begun_from_plots(lanes, key, ordinal, scene)
             jobs.append(begun)
     return lanes, [job for job in jobs if job is not None]
+
+
+def give_back(lanes: Lanes, plot: Plot, key: Key, scene: Scene) -> tuple[Lanes, Job | None]:
+    """The lanes after a plot was taken out of its radar track: its track is to be worked again from there."""
+    track = lane_of(lanes, plot, key, scene)
+    if track is None or not contains(lanes, track, plot):
+        return lanes, None
+    return _rebuilt(lanes, lanes.lanes[track], plot.at, scene)
 
 
 def _inserted(lanes: Lanes, lane: Lane, measure: Measure, scene: Scene) -> tuple[Lanes, Job | None]:

@@ -12,8 +12,10 @@ from gateway.track.numbered import (
     name_of,
     table,
 )
+from gateway.track.unnumbered import FIRST_OWN, Taken, Unnumbered
 
 __all__ = [
+    "FIRST_OWN",
     "GREATEST_SPEED_MPS",
     "PLOTS_AT_MOST",
     "TRACKS_AT_MOST",
@@ -21,7 +23,9 @@ __all__ = [
     "Number",
     "Place",
     "RadarTracks",
+    "Taken",
     "Tracked",
+    "Unnumbered",
     "name_of",
     "table",
 ]

@@ -92,6 +92,22 @@ class RadarTracks:
         places = {**self.places, key: place_now}
         return RadarTracks(plots, places, episodes, self.closed, silent, self.first_episode), key
 
+    def without(self, plot: Plot) -> tuple[RadarTracks, Key | None]:
+        """The same without a plot; and the radar track that had it, None if none has."""
+        for episode in range(self.episode.get((plot.radar, plot.number), -1), -1, -1):
+            key = (plot.radar, plot.number, episode)
+            known = self.plots.get(key, ())
+            rest = tuple(other for other in known if other.serial != plot.serial)
+            if len(rest) < len(known):
+                plots = {**self.plots, key: rest}
+                if not rest:
+                    del plots[key]
+                places = {one: place for one, place in self.places.items() if one in plots}
+                return replace(self, plots=plots, places=places), key
+            if not known:
+                break
+        return self, None
+
     def has_room(self, plot: Plot) -> bool:
         """Whether a plot's radar track is known, or one more can be kept."""
         if len(self.plots) < TRACKS_AT_MOST:

@@ -1,0 +1,46 @@
+"""How a radar measures: range, azimuth and elevation of positions in its own frame, over arrays with targets last."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.frames import polar_from_xyz, polar_jacobian, xyz_from_polar
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+GUESSED_ELEVATION_RAD, GUESSED_SIGMA_RAD = (
+    math.radians(3.0),
+    math.radians(3.0),
+)  # where none was measured: aircraft are low
+
+
+class RadarSight:
+    """Positions (3, n) along the radar's x, y, z; values (3, n): range m, azimuth and elevation rad. See `Sight`."""
+
+    turn: float | None = 2.0 * math.pi
+
+    def measured(self, position: Floats) -> tuple[Floats, Floats]:
+        """What the radar would measure, and the derivatives (3, 3, n)."""
+        xyz = position.T
+        return polar_from_xyz(xyz).T, polar_jacobian(xyz).transpose(1, 2, 0)
+
+    def off(self, value: Floats, expected: Floats) -> Floats:
+        """Differences; azimuths the short way round."""
+        off = value - expected
+        off[1] -= 2.0 * math.pi * np.round(off[1] / (2.0 * math.pi))
+        return off
+
+    def placed(self, value: Floats, variance: Floats) -> tuple[Bools, Floats, Floats]:
+        """Where range and azimuth are measured; without an elevation at a guessed one, of which little is claimed."""
+        whole: Bools = np.logical_not(np.isnan(value[:2]).any(axis=0))
+        polar, spread = value[:, whole], variance[:, whole]
+        level = np.isnan(polar[2])
+        polar[2, level], spread[2, level] = GUESSED_ELEVATION_RAD, GUESSED_SIGMA_RAD**2
+        xyz = xyz_from_polar(polar.T)
+        back = np.linalg.inv(polar_jacobian(xyz)) if len(xyz) else np.zeros((0, 3, 3))
+        covariance = (back * spread.T[:, None, :]) @ back.transpose(0, 2, 1)
+        return whole, xyz.T, covariance.transpose(1, 2, 0)

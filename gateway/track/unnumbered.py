@@ -1,0 +1,289 @@
+"""Plots that carry no number, or one that is not to be believed, become radar tracks by track splitting, each radar by itself.
+
+Plots wait a tenth of a second for the others of their scan, then the slice of time that they fall into is worked: a quarter of
+the radar's period, so that a scan may come at once, in pieces or turning. The slices of the history are kept, each with the
+families after it. A plot that comes late goes into its slice, and all slices from there on are worked again; what they then
+tell otherwise is told and taken back.
+
+What is told are the plots of confirmed families under numbers of our own, from `FIRST_OWN` on; for everything behind they are
+the radar's numbered plots.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.align import SECOND, Plot
+from gateway.estimators.track_splitting import Bank, Plots, Splitting, scan
+from gateway.settings import Options, RadarSite
+from gateway.track.density import Density
+from gateway.track.sight import RadarSight
+
+Floats = NDArray[np.float64]
+
+FIRST_OWN = 100_001  # radars number with 16 bits
+SLICES = 4  # of a period
+WAIT_NS = SECOND // 10  # for the other plots of a scan
+GREATEST_LEVEL_MPS, GREATEST_CLIMB_MPS = 300.0, 40.0
+FORGOTTEN_S, FORGOTTEN_SCANS = 10.0, 5.0  # of silence of a whole radar, whichever is longer
+BUDGET = 2000  # hypotheses of a radar
+PLOTS_AT_MOST = 10_000  # of a slice
+WAITING_AT_MOST = 20_000
+SURE = 0.5  # a plot is told of a family that has it with more than this weight
+SURE_SIGMAS = 3.1  # of a speed: one in a thousand
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Slice:
+    """One slice of a radar's time: its plots in order, and all that was known after it."""
+
+    index: int
+    plots: tuple[Plot, ...]
+    bank: Bank
+    density: Density
+    told: Mapping[int, int]  # serial of a plot -> the family that it was told of in this slice
+    crowded: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Watch:
+    """One radar's unnumbered plots: slices of the history in order, what was before them, and plots that wait."""
+
+    period_s: float
+    base: tuple[Bank, Density]
+    slices: tuple[Slice, ...] = ()
+    waiting: tuple[Plot, ...] = ()
+    due: int | None = None  # when what waits is worked
+    numbers: Mapping[int, int] = field(default_factory=dict)  # family -> the number that we gave it
+    next_number: int = FIRST_OWN
+
+    @property
+    def newest(self) -> tuple[Bank, Density]:
+        """What is known now."""
+        return (self.slices[-1].bank, self.slices[-1].density) if self.slices else self.base
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """What working came to: plots under our numbers, plots that are taken back from them, and those that nobody has."""
+
+    told: tuple[Plot, ...] = ()
+    back: tuple[Plot, ...] = ()
+    untold: int = 0
+    crowded: tuple[int, ...] = ()  # radars with so many plots at once that not all of them can be followed
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Unnumbered:
+    """The stage's state for unnumbered plots: each radar's watch, and how often radars scan, by their own word."""
+
+    watches: Mapping[int, Watch] = field(default_factory=dict)
+    periods_s: Mapping[int, float] = field(default_factory=dict)
+    next_numbers: Mapping[int, int] = field(default_factory=dict)  # of radars whose watch was given up
+
+    @property
+    def due(self) -> int | None:
+        """When the next waiting plots are to be worked."""
+        return min((watch.due for watch in self.watches.values() if watch.due is not None), default=None)
+
+    def scanning(self, radar: int, period_s: float) -> Unnumbered:
+        """The same after a radar's word on how long a scan takes."""
+        if self.periods_s.get(radar) == period_s or not 0.02 <= period_s <= 60.0:
+            return self
+        return replace(self, periods_s={**self.periods_s, radar: period_s})
+
+    def hearing(
+        self, plots: Sequence[Plot], radars: Mapping[int, RadarSite], now: int
+    ) -> tuple[Unnumbered, list[Plot]]:
+        """The same with an arrival's plots, which wait; and those that cannot: too many do, or no period is known."""
+        watches = dict(self.watches)
+        unused: list[Plot] = []
+        by_radar: dict[int, list[Plot]] = {}
+        for plot in plots:
+            by_radar.setdefault(plot.radar, []).append(plot)
+        for radar, some in by_radar.items():
+            watch = self._watch(radar, radars[radar], some[0].at)
+            if watch is None:
+                unused += some
+                continue
+            room = max(WAITING_AT_MOST - len(watch.waiting), 0)
+            unused += some[room:]
+            due = now + WAIT_NS if watch.due is None else watch.due
+            watches[radar] = replace(watch, waiting=(*watch.waiting, *some[:room]), due=due)
+        return replace(self, watches=watches), unused
+
+    def _watch(self, radar: int, site: RadarSite, at: int) -> Watch | None:
+        """A radar's watch, begun anew where there is none or the radar's period has changed."""
+        watch, period_s = self.watches.get(radar), site.period_s or self.periods_s.get(radar)
+        if period_s is None or (watch is not None and watch.period_s == period_s):
+            return watch
+        density = Density.at_first(site.maximum_range_m, site.clutter_per_scan, site.detection_probability)
+        base = Bank.empty(at, 3), density
+        if watch is not None:
+            return Watch(period_s, base, (), watch.waiting, watch.due, next_number=watch.next_number)
+        return Watch(period_s, base, next_number=self.next_numbers.get(radar, FIRST_OWN))
+
+    def worked(self, now: int, radars: Mapping[int, RadarSite], options: Options) -> tuple[Unnumbered, Taken]:
+        """The same with what was due at an instant, and what came of it."""
+        watches, all_taken = dict(self.watches), []
+        for radar, watch in self.watches.items():
+            if watch.due is not None and watch.due <= now:
+                watches[radar], taken = _worked(watch, radars[radar], options)
+                all_taken.append(taken)
+        return replace(self, watches=watches), Taken(
+            tuple(plot for taken in all_taken for plot in taken.told),
+            tuple(plot for taken in all_taken for plot in taken.back),
+            sum(taken.untold for taken in all_taken),
+            tuple(radar for taken in all_taken for radar in taken.crowded),
+        )
+
+    def pruned(self, before: int) -> Unnumbered:
+        """The same without slices older than an instant; a radar that has been silent for long is forgotten, its numbers not."""
+        watches, next_numbers = {}, dict(self.next_numbers)
+        for radar, watch in self.watches.items():
+            width = _width(watch)
+            old = bisect_left(watch.slices, before // width, key=lambda one: one.index)
+            if old == len(watch.slices) and not watch.waiting:
+                silent_s = (before - watch.newest[0].at) / SECOND
+                if silent_s > max(FORGOTTEN_S, FORGOTTEN_SCANS * watch.period_s):
+                    next_numbers[radar] = watch.next_number
+                    continue
+            if old:
+                last = watch.slices[old - 1]
+                kept = watch.slices[old:]
+                named = {number for one in (last, *kept) for number in one.bank.number.tolist()}
+                numbers = {family: number for family, number in watch.numbers.items() if family in named}
+                watch = replace(watch, base=(last.bank, last.density), slices=kept, numbers=numbers)
+            watches[radar] = watch
+        return Unnumbered(watches, self.periods_s, next_numbers)
+
+    def emptied(self) -> Unnumbered:
+        """The same when the session begins anew: nothing is remembered but which numbers were given."""
+        numbers = {radar: watch.next_number for radar, watch in self.watches.items()}
+        return Unnumbered({}, self.periods_s, {**self.next_numbers, **numbers})
+
+
+def _width(watch: Watch) -> int:
+    return max(int(watch.period_s * SECOND) // SLICES, 1)
+
+
+def _worked(watch: Watch, site: RadarSite, options: Options) -> tuple[Watch, Taken]:
+    """All slices from the first one on that a waiting plot falls into."""
+    by_slice: dict[int, list[Plot]] = {}
+    for plot in watch.waiting:
+        by_slice.setdefault(plot.at // _width(watch), []).append(plot)
+    place = bisect_left(watch.slices, min(by_slice), key=lambda one: one.index)
+    again = watch.slices[place:]
+    for old in again:
+        by_slice.setdefault(old.index, []).extend(old.plots)
+    slices = list(watch.slices[:place])
+    bank, density = (slices[-1].bank, slices[-1].density) if slices else watch.base
+    told = {serial: family for one in slices for serial, family in one.told.items()}
+    known = len(slices)
+    for index in sorted(by_slice):
+        plots = tuple(sorted(by_slice[index], key=_order)[:PLOTS_AT_MOST])
+        one = _slice(index, plots, bank, density, told, watch, site, options)
+        bank, density = one.bank, one.density
+        told |= one.told
+        slices.append(one)
+    grown = replace(watch, slices=tuple(slices), waiting=(), due=None)
+    return _difference(grown, again, slices[known:], watch.waiting)
+
+
+def _order(plot: Plot) -> tuple[float, ...]:
+    """By what was measured, so that it does not matter in which order plots came; nothing sorts after NaN, so that is -1."""
+    return (plot.at, *(-1.0 if math.isnan(part) else part for part in plot.polar), plot.serial)
+
+
+def _slice(
+    index: int,
+    plots: Sequence[Plot],
+    bank: Bank,
+    density: Density,
+    told: Mapping[int, int],
+    watch: Watch,
+    site: RadarSite,
+    options: Options,
+) -> Slice:
+    """One slice worked after another."""
+    at = plots[-1].at
+    share = min(max((at - bank.at) / SECOND / watch.period_s, 0.0), 1.0)
+    if (at - bank.at) / SECOND > max(FORGOTTEN_S, FORGOTTEN_SCANS * watch.period_s):
+        bank = Bank.empty(at, 3)  # nothing holds over such a time
+    value = np.array([plot.polar for plot in plots]).T
+    variance = np.array([plot.sigma for plot in plots]).T ** 2
+    clutter, newborn = density.of(value)
+    serial = np.array([plot.serial for plot in plots], dtype=np.int64)
+    seen = Plots(value, variance, clutter, newborn, np.array([plot.at for plot in plots], dtype=np.int64), serial)
+    looked = dict(zip(bank.number.tolist(), bank.looks.tolist(), strict=True))
+    was = set(bank.number[bank.confirmed].tolist())
+    bank, found = scan(bank, seen, at, RadarSight(), _splitting(density, options), watch.period_s)
+    bank = _flying(bank, was, site.slowest_mps)
+    best = bank.best
+    now = np.flatnonzero(bank.confirmed & (bank.weight[best] > SURE))
+    fresh: dict[int, int] = {}
+    hits = looks = 0
+    for family in now.tolist():
+        name, path = int(bank.number[family]), bank.path[:, best[family]].tolist()
+        if name in was:
+            if int(bank.looks[family]) == looked.get(name):
+                continue
+            looks += 1
+            hits += path[0] > 0
+            path = path[:1]
+        fresh |= {one: name for one in path if one and one not in told}
+    density = density.after(value, found.unexplained, share).detecting(hits, looks)
+    return Slice(index, tuple(plots), bank, density, fresh, found.left_out > 0)
+
+
+def _splitting(density: Density, options: Options) -> Splitting:
+    level = options.acceleration_sigma_mps2**2 * options.acceleration_time_s
+    upright = options.vertical_acceleration_sigma_mps2**2 * options.acceleration_time_s
+    speeds = GREATEST_LEVEL_MPS, GREATEST_LEVEL_MPS, GREATEST_CLIMB_MPS
+    return Splitting((level, level, upright), speeds, density.detection, budget=BUDGET)
+
+
+def _flying(bank: Bank, was: set[int], slowest_mps: float) -> Bank:
+    """The bank where only what was confirmed before, or surely flies faster than the slowest aircraft, is confirmed.
+
+    What moves slower with the wind is there and is followed, so that its plots begin nothing else: birds, rain's edges.
+    """
+    new = np.flatnonzero(bank.confirmed & ~np.isin(bank.number, np.array(sorted(was), dtype=np.int64)))
+    if not len(new) or slowest_mps <= 0.0:
+        return bank
+    row = bank.best[new]
+    velocity = bank.mean[3:, row]
+    speed = np.sqrt((velocity * velocity).sum(axis=0))
+    along = velocity / np.maximum(speed, 1e-9)
+    variance = np.einsum("an,abn,bn->n", along, bank.covariance[3:, 3:, row], along)
+    sure = speed - SURE_SIGMAS * np.sqrt(variance) > slowest_mps
+    confirmed = bank.confirmed.copy()
+    confirmed[new[~sure]] = False
+    return replace(bank, confirmed=confirmed)
+
+
+def _difference(
+    watch: Watch, before: Sequence[Slice], after: Sequence[Slice], heard: Sequence[Plot]
+) -> tuple[Watch, Taken]:
+    """What is told now and was not, and the other way round; families that are told get a number."""
+    was = {serial: family for one in before for serial, family in one.told.items()}
+    told = {serial: family for one in after for serial, family in one.told.items()}
+    numbers, following = dict(watch.numbers), watch.next_number
+    for family in told.values():
+        if family not in numbers:
+            numbers[family] = following
+            following += 1
+    by_serial = {plot.serial: plot for one in watch.slices for plot in one.plots}
+    new = [serial for serial, family in told.items() if was.get(serial) != family and serial in by_serial]
+    gone = [serial for serial, family in was.items() if told.get(serial) != family and serial in by_serial]
+    some = sorted((replace(by_serial[one], number=numbers[told[one]]) for one in new), key=_order)
+    back = sorted((replace(by_serial[one], number=numbers[was[one]]) for one in gone), key=_order)
+    untold = sum(plot.serial not in told for plot in heard)
+    crowded = (heard[0].radar,) if any(one.crowded for one in after) else ()
+    return replace(watch, numbers=numbers, next_number=following), Taken(tuple(some), tuple(back), untold, crowded)
