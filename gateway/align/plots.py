@@ -29,20 +29,6 @@ class Plot:
     sigma: Polar
     taken_off: Correction = NOTHING
 
-    @property
-    def said_at(self) -> int:
-        """The radar's own stamp."""
-        return self.at + round(self.taken_off[3] * SECOND)
-
-    @property
-    def said(self) -> Polar:
-        """What the radar measured, before anything was taken off."""
-        return (
-            self.polar[0] + self.taken_off[0],
-            self.polar[1] + self.taken_off[1],
-            self.polar[2] + self.taken_off[2],
-        )
-
 
 def place_plot(plot: RadarPlot, serial: int, radar: RadarSite, correction: Correction) -> Plot:
     """A plot with its radar's errors taken off, and the site's sigmas where it gives none."""

@@ -24,6 +24,7 @@ NO_PRIOR_M = 1e5
 RADAR_SIGMA = np.array([2000.0, 0.1, 0.1, 0.15])
 _OWN_LEAST_M = 1.0
 _OWN_ROUNDS = 12
+_OWN_SETTLED = 3e-3
 _OWN_FREEDOM = 3.0  # the prior of own errors' size weighs as much as one aircraft
 _WEAK = 1.0 / 30.0**2  # of the largest eigenvalue: geometry does not tell what lies along such a direction
 _SHARE = 0.2  # a parameter with more than this of a weak direction is not observable
@@ -88,22 +89,29 @@ class Solution:
         return spread
 
 
-def solved(evidence: Evidence, own_sigma_m: float, common_sigma_m: float = COMMON_SIGMA_M) -> Solution | None:
-    """The errors that the evidence tells; None without evidence. `own_sigma_m`: what own errors are expected to be, an axis."""
+def solved(
+    evidence: Evidence, own_sigma_m: float, common_sigma_m: float = COMMON_SIGMA_M, before: Solution | None = None
+) -> Solution | None:
+    """The errors that the evidence tells; None without evidence.
+
+    `own_sigma_m`: what own errors are expected to be, an axis. `before`: what was found with a little less of it, to begin from.
+    """
     if not evidence.radars:
         return None
     equations = _Equations.of(evidence)
     prior = np.concatenate([np.tile(RADAR_SIGMA**-2.0, len(evidence.radars)), np.full(3, common_sigma_m**-2.0)])
-    own = own_sigma_m
+    own = own_sigma_m if before is None else before.own_sigma_m
     for _ in range(_OWN_ROUNDS):
-        information, vector = equations.without_own(own)
+        apart = equations.apart(own)
+        information, vector = equations.without_own(own, apart)
         error, covariance = _inverted(information + np.diag(prior), vector)
-        place, variance, across = equations.places(error, covariance, own)
-        apart = place - error[-3:]
-        spread = float((apart * apart).sum()) + equations.spread(covariance, own)
-        known = _OWN_FREEDOM + 3.0 * len(equations.aircraft)
-        renewed = max(math.sqrt((_OWN_FREEDOM * own_sigma_m**2 + spread) / known), _OWN_LEAST_M)
-        done, own = abs(renewed - own) < 1e-3 * own, renewed
+        place, variance, across = equations.places(error, covariance, own, apart)
+        off = place - error[-3:]
+        unsure = _trace(variance) + len(place) * _trace(covariance[-3:, -3:]) - 2.0 * _trace(across[:, -3:, :])
+        known = _OWN_FREEDOM + 3.0 * len(place)
+        square = (_OWN_FREEDOM * own_sigma_m**2 + float((off * off).sum()) + unsure) / known
+        renewed = max(math.sqrt(square), _OWN_LEAST_M)
+        done, own = abs(renewed - own) < _OWN_SETTLED * own, renewed
         if done:
             break
     observable, condition = _told_by_geometry(information)
@@ -133,7 +141,8 @@ def folded(evidence: Evidence, before: int, own_sigma_m: float) -> Evidence:
         return evidence
     stays = sorted(set(range(len(evidence.links))) - set(gone))
     left, rest = _some(evidence, gone), _some(evidence, stays)
-    total, vector = _Equations.of(left).without_own(own_sigma_m)
+    equations = _Equations.of(left)
+    total, vector = equations.without_own(own_sigma_m, equations.apart(own_sigma_m))
     return Evidence(
         rest.links, rest.information, rest.vector, rest.last, evidence.radars, (total, vector), evidence.pairs
     )
@@ -183,15 +192,13 @@ class _Equations:
         np.add.at(by_place, rows, evidence.vector[:, EACH:])
         return cls(names, radars, by_radars, cross, place, by_place, evidence.folded)
 
-    def _gain(self, own_m: float) -> tuple[Floats, Floats]:
-        """The inverse of what is known of each place about the common error, and what radars' errors do to it."""
-        apart: Floats = np.asarray(np.linalg.inv(self.place + np.eye(3) / own_m**2))
-        return apart, np.asarray(self.cross @ apart)
+    def apart(self, own_m: float) -> Floats:
+        """The covariance of each place for given other errors, (k, 3, 3)."""
+        return np.asarray(np.linalg.inv(self.place + np.eye(3) / own_m**2))
 
-    def without_own(self, own_m: float) -> tuple[Floats, Floats]:
+    def without_own(self, own_m: float, apart: Floats) -> tuple[Floats, Floats]:
         """Information and vector of radars' errors and the common one, own errors of this size eliminated."""
-        apart, gain = self._gain(own_m)
-        weight = own_m**-2.0
+        gain, weight = self.cross @ apart, own_m**-2.0
         total, vector = self.folded[0].copy(), self.folded[1].copy()
         total[:-3, :-3] += (self.radars - gain @ self.cross.swapaxes(-1, -2)).sum(axis=0)
         total[:-3, -3:] += weight * gain.sum(axis=0)
@@ -202,26 +209,18 @@ class _Equations:
         vector[-3:] += weight * (apart @ self.by_place[..., None])[..., 0].sum(axis=0)
         return total, vector
 
-    def places(self, error: Floats, covariance: Floats, own_m: float) -> tuple[Floats, Floats, Floats]:
+    def places(self, error: Floats, covariance: Floats, own_m: float, apart: Floats) -> tuple[Floats, Floats, Floats]:
         """The whole error of each aircraft's source (k, 3), its covariance (k, 3, 3), and that with all others (k, p, 3)."""
-        apart, gain = self._gain(own_m)
         by_radars = (self.cross.swapaxes(-1, -2) @ error[:-3, None])[..., 0]
         place = (apart @ (self.by_place - by_radars + error[-3:] * own_m**-2.0)[..., None])[..., 0]
-        back = self._back(gain, apart, own_m)
+        back = np.concatenate([-(self.cross @ apart).swapaxes(-1, -2), apart * own_m**-2.0], axis=-1)
         across = (back @ covariance).swapaxes(-1, -2)
         return place, apart + back @ across, across
 
-    def spread(self, covariance: Floats, own_m: float) -> float:
-        """The sum of the variances of all own errors."""
-        apart, gain = self._gain(own_m)
-        back = self._back(gain, apart, own_m)
-        back[:, :, -3:] -= np.eye(3)
-        own = apart + back @ covariance @ back.swapaxes(-1, -2)
-        return float(np.trace(own, axis1=-2, axis2=-1).sum())
 
-    def _back(self, gain: Floats, apart: Floats, own_m: float) -> Floats:
-        """How places follow radars' errors and the common one, (k, 3, p)."""
-        return np.concatenate([-gain.swapaxes(-1, -2), apart * own_m**-2.0], axis=-1)
+def _trace(matrices: Floats) -> float:
+    """The sum of all diagonals of (..., 3, 3)."""
+    return float(np.trace(matrices, axis1=-2, axis2=-1).sum())
 
 
 def _inverted(information: Floats, vector: Floats) -> tuple[Floats, Floats]:

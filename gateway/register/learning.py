@@ -166,7 +166,7 @@ class Registration:
         common_m = max(position.systematic_m, 1.0) * COMMON_SHARE
         own_m = usual_m if self.solution is None else self.solution.own_sigma_m
         evidence = folded(self.evidence, at - FOLDED_AFTER_NS, own_m)
-        solution = solved(evidence, usual_m, common_m)
+        solution = solved(evidence, usual_m, common_m, self.solution)
         if solution is None:
             return replace(self, evidence=evidence, solution=None, is_new=False), []
         wrong = solution.prior_chi_square > PRIOR_CHI_SQUARE

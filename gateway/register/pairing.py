@@ -7,9 +7,10 @@ is carried to each by its own velocity, and what they are off is averaged.
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,7 @@ class Gathered:
     held: Bools
 
 
-Met = tuple[Fix, Floats, int, bool, Sequence[Plot]]  # a report, its velocity, the radar, whether held, the plots
+Met = tuple[Fix, int, bool, Sequence[Plot]]  # a report, the radar, whether held, the plots about its time
 
 
 def gathered(
@@ -48,97 +49,103 @@ def gathered(
     met = list(_met(state, spans, tracks, radars, first, last))
     if not met:
         return None
-    count = len(met)
-    radar = [number for _, _, number, _, _ in met]
-    enu = np.array([fix.enu_m for fix, *_ in met])
-    velocity = np.array([speed for _, speed, *_ in met])
-    variance = np.array([fix.sigma_m for fix, *_ in met]) ** 2
-    owner = np.repeat(np.arange(count), [len(plots) for *_, plots in met])
-    some = [(plot, fix) for fix, _, _, _, plots in met for plot in plots]
-    elapsed_s = np.array([(plot.said_at - fix.at) / SECOND for plot, fix in some])
-    said = np.array([plot.said for plot, _ in some])
-    weight = np.array([plot.sigma for plot, _ in some]) ** -2.0
-    by_enu, expected, level = np.empty((count, 3, 3)), np.empty((len(some), 3)), np.empty(count)
-    carried = enu[owner] + velocity[owner] * elapsed_s[:, None]
+    fixes, radar, held, plots = zip(*met, strict=True)
+    count = len(fixes)
+    enu, velocity = np.array([fix.enu_m for fix in fixes]), _velocities(fixes, state)
+    variance = np.array([fix.sigma_m for fix in fixes]) ** 2
+    owner = np.repeat(np.arange(count), [len(some) for some in plots])
+    said, sigma, elapsed_s = _said([plot for some in plots for plot in some], [fix.at for fix in fixes], owner)
     numbers = np.array(radar)
+    by_enu, expected, level = np.empty((count, 3, 3)), np.empty(said.shape), np.empty(count)
+    carried = enu[owner] + velocity[owner] * elapsed_s[:, None]
     for number in dict.fromkeys(radar):
-        frame, mine, plots = radars[number], numbers == number, numbers[owner] == number
+        frame, mine, seen = radars[number], numbers == number, numbers[owner] == number
         local = frame.from_enu(enu[mine])
         by_enu[mine] = polar_jacobian(local) @ frame.radar_from_enu
         level[mine] = np.hypot(local[:, 0], local[:, 1])
-        expected[plots] = polar_from_xyz(frame.from_enu(carried[plots]))
+        expected[seen] = polar_from_xyz(frame.from_enu(carried[seen]))
     off = said - expected
     off[:, 1] -= 2.0 * math.pi * np.round(off[:, 1] / (2.0 * math.pi))
-    weight = np.where(np.isnan(off), 0.0, weight)
+    is_near = np.abs(elapsed_s) <= WITHIN_NS / SECOND
+    weight = np.where(np.isnan(off) | ~is_near[:, None], 0.0, sigma**-2.0)
     total, weighed = np.zeros((count, 3)), np.zeros((count, 3))
     np.add.at(total, owner, weight)
     np.add.at(weighed, owner, weight * np.nan_to_num(off))
-    known = (total > 0.0) & (level > NEAREST_M)[:, None]
+    known = (total > 0.0) & ((level > NEAREST_M) & ~np.isnan(velocity).any(axis=1))[:, None]
     safe = np.where(known, total, 1.0)
     noise = 1.0 / safe + (by_enu * by_enu * variance[:, None, :]).sum(axis=-1)
     pairs = Pairs(
-        [fix.aircraft for fix, *_ in met],
-        radar,
+        [fix.aircraft for fix in fixes],
+        list(radar),
         np.where(known, weighed / safe, math.nan),
         np.where(known, np.sqrt(noise), math.nan),
         by_enu,
         (by_enu @ velocity[:, :, None])[:, :, 0],
     )
-    return Gathered([fix.at for fix, *_ in met], pairs, np.array([held for _, _, _, held, _ in met]))
+    some = np.flatnonzero(known.any(axis=1)).tolist()
+    if not some:
+        return None
+    return Gathered([fixes[row].at for row in some], pairs.chosen(some), np.array(held)[some])
 
 
 def _met(
     state: Association, spans: Spans, tracks: RadarTracks, radars: Mapping[int, RadarFrame], first: int, last: int
 ) -> Iterator[Met]:
-    """Each report with a height and a velocity, and the plots about its time of each radar track that is its aircraft."""
+    """Each report with a height, and the plots about its time of each radar track that is its aircraft."""
     checks = state.checks
     for place in range(bisect_left(checks, (first, ""), key=lambda check: check.order), len(checks)):
         fix = checks[place].fix
         if fix.at >= last:
             return
-        mine = spans.by_aircraft.get(fix.aircraft, ())
-        if not mine or not fix.has_height or (velocity := _velocity(fix, state)) is None:
+        mine = spans.by_aircraft.get(fix.aircraft)
+        if mine is None or not fix.has_height:
             continue
         for key, held in _tracks_of(mine, spans, fix.at):
             plots = _about(tracks.plots.get(key, ()), fix.at)
             if plots and key[0] in radars:
-                yield fix, velocity, key[0], held, plots
+                yield fix, key[0], held, plots
 
 
-def _tracks_of(mine: Sequence[Span], spans: Spans, at: int) -> Iterator[tuple[Key, bool]]:
+def _tracks_of(mine: Sequence[Span], spans: Spans, at: int) -> list[tuple[Key, bool]]:
     """The radar tracks that an aircraft was at an instant; and those that it was until lately, if neither has another since."""
-    held = {span.key for span in mine if span.since <= at and (span.until is None or at < span.until)}
-    yield from ((key, True) for key in sorted(held))
-    radars = {key[0] for key in held}
+    found = [(span.key, True) for span in mine if span.since <= at and (span.until is None or at < span.until)]
+    if len(found) == len(mine):
+        return found
+    radars = {key[0] for key, _ in found}
     for span in mine:
         if span.until is None or not span.until <= at < span.until + FORMER_NS or span.key[0] in radars:
             continue
         others = spans.by_key.get(span.key, ())
         if all(other.since <= span.since or other.since > at for other in others):
-            yield span.key, False
-
-
-def _about(plots: Sequence[Plot], at: int) -> list[Plot]:
-    """Those that the radar stamped within half a second of an instant; by its stamp, what was taken off plays no part."""
-    begin = bisect_left(plots, at - 2 * WITHIN_NS, key=lambda plot: plot.at)
-    found = []
-    for place in range(begin, len(plots)):
-        plot = plots[place]
-        if plot.at > at + 2 * WITHIN_NS:
-            break
-        if abs(plot.said_at - at) <= WITHIN_NS:
-            found.append(plot)
+            found.append((span.key, False))
     return found
 
 
-def _velocity(fix: Fix, state: Association) -> Floats | None:
-    """What the report says of it; else from this report to the next one of the aircraft, or from the one before."""
-    if not np.isnan(fix.velocity_mps).any():
-        return fix.velocity_mps
-    known = state.chosen.get(fix.aircraft, ())
-    place = bisect_left(known, fix.at, key=lambda other: other.at)
-    beside = [known[near] for near in (place + 1, place - 1) if 0 <= near < len(known)]
-    for other in beside:
-        if other.at != fix.at and other.has_height:
-            return np.asarray((other.enu_m - fix.enu_m) * (SECOND / (other.at - fix.at)))
-    return None
+def _about(plots: Sequence[Plot], at: int) -> Sequence[Plot]:
+    """Those that may have been stamped within half a second of an instant, whatever was taken off their stamps."""
+    begin = bisect_left(plots, at - 2 * WITHIN_NS, key=_at)
+    return plots[begin : bisect_right(plots, at + 2 * WITHIN_NS, lo=begin, key=_at)]
+
+
+_at = attrgetter("at")
+
+
+def _said(plots: Sequence[Plot], at: Sequence[int], owner: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
+    """What radars measured before anything was taken off (m, 3), its sigmas, and how long after their reports, s, by stamp."""
+    taken_off = np.array([plot.taken_off for plot in plots])
+    stamps = np.array([plot.at for plot in plots], np.int64) - np.array(at, np.int64)[owner]
+    sigma = np.array([plot.sigma for plot in plots])
+    said = np.array([plot.polar for plot in plots]) + taken_off[:, :3]
+    return said, sigma, stamps / SECOND + taken_off[:, 3]
+
+
+def _velocities(fixes: Sequence[Fix], state: Association) -> Floats:
+    """What reports say of them, (n, 3); else to the next report of the aircraft that was checked, or from the one before."""
+    velocity = np.array([fix.velocity_mps for fix in fixes])
+    for row in np.flatnonzero(np.isnan(velocity).any(axis=1)).tolist():
+        fix, known = fixes[row], state.chosen.get(fixes[row].aircraft, ())
+        place = bisect_left(known, fix.at, key=_at)
+        for other in (known[near] for near in (place - 1, place + 1) if 0 <= near < len(known)):
+            if other.at != fix.at and other.has_height:
+                velocity[row] = (other.enu_m - fix.enu_m) * (SECOND / (other.at - fix.at))
+    return velocity

@@ -124,9 +124,9 @@ def test_aircraft_that_left_are_folded_into_one_sum_that_tells_the_same() -> Non
     assert folded(evidence, 59 * SECOND, known.own_sigma_m) is evidence
     again = solved(alone, known.own_sigma_m)
     assert again is not None
-    assert again.error == pytest.approx(known.error, rel=1e-3)
-    assert again.sigma == pytest.approx(known.sigma, rel=1e-3)
-    assert again.common_m == pytest.approx(known.common_m, rel=1e-3)
+    assert again.error == pytest.approx(known.error, rel=1e-2)
+    assert again.sigma == pytest.approx(known.sigma, rel=1e-2)
+    assert again.common_m == pytest.approx(known.common_m, rel=1e-2)
 
 
 def test_a_radar_that_is_heard_later_gets_errors_of_its_own() -> None:
