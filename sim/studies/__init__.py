@@ -17,6 +17,7 @@ STUDIES = (
     "registration",
     "clutter",
     "reconstruction",
+    "dead-reckoning",
 )  # the modules of this package that have a `run`, `-` for `_`
 
 Progress = Callable[[str, float], None]  # what is being done, and the share of the whole that is done
