@@ -71,7 +71,6 @@ class Parameters:
                 observation.height_m,
                 observation.horizontal_sigma_m,
             )
-
         elif isinstance(observation, VehicleStatus):
             self.kind = observation.vehicle_type
 

@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from adapters.decode import Decoder
-from gateway.observation import AirData, Attitude, GpsReport, VehicleStatus
+from gateway.observation import AirData, Attitude, GpsReport, Many, VehicleStatus
 from gateway.offline.parameters import Parameters
 from gateway.offline.reconstruction import Sortie
 from gateway.runtime.playback import Playback
@@ -38,8 +38,9 @@ def read_parameters(playback: Playback, tell: Callable[[float], None]) -> dict[s
     while some := list(islice(left, _TOGETHER)):
         for _, heard in decoder.hear_many(some)[0]:
             for observation in heard.observations:
-                if isinstance(observation, AirData | Attitude | GpsReport | VehicleStatus):
-                    found.setdefault(observation.aircraft, Parameters()).take(observation)
+                for one in observation if isinstance(observation, Many) else (observation,):
+                    if isinstance(one, AirData | Attitude | GpsReport | VehicleStatus):
+                        found.setdefault(one.aircraft, Parameters()).take(one)
         tell(playback.fraction())
     return found
 
