@@ -20,6 +20,7 @@ from gateway.tracking import Tracked, Tracking
 
 PLOT_MARGIN_S = 4.0  # plots are remembered this much longer than reports: a report's check looks back over them
 
+
 class Work(Tracking):
     """The stages of one step; lives only inside `pipeline.step`, which calls them in order for each arrival."""
 
@@ -57,6 +58,7 @@ class Work(Tracking):
         for found in findings:
             self._say_scatter(found)
         lanes, ended = fuse.end_silent(self.lanes, at, self.options)
+        self.settled += fuse.settled(self.lanes, lanes)
         self.ended += ended
         self.events += [Event(at, "info", f"track {end.track} ended: {end.reason}") for end in ended if not end.quiet]
         lanes, lived = fuse.told(lanes, at, self.options)
@@ -180,7 +182,8 @@ class Work(Tracking):
         allowed = remaining(self.registration, self.radars, at)
         state, seen = associate.compared(self.association.together, at, self.tracks, self.radar_frames, allowed)
         self.association = replace(self.association, together=state)
-        known, found = self._spans, fuse.spans_with(self.association.ledger.spans, self.lanes.adopted)
+        known, found = self._spans, self.association.ledger.spans
+        found = fuse.spans_with(found, self.lanes.adopted) if self.lanes.adopted else found
         groups, alive = associate.together(seen.keys, state.one), frozenset(seen.keys)
         done = fuse.regrouped(self.lanes, groups, alive, found, known, self.tracks, at)
         if done.lanes is not self.lanes:

@@ -54,15 +54,23 @@ def compared(
 
 def _made(one: frozenset[Pair], counts: Mapping[Pair, int], alive: frozenset[Key]) -> frozenset[Pair]:
     """The pairs that are one, with those that now are: of each radar at most one track that still has plots."""
-    taken = {(key, other[0]) for pair in one if alive.issuperset(pair) for key, other in (pair, pair[::-1])}
+    full = sorted(pair for pair, value in counts.items() if value == FAST_HITS and pair not in one)
+    if not full:
+        return one
     made = set(one)
-    for pair, value in sorted(counts.items()):
-        ends = {(key, other[0]) for key, other in (pair, pair[::-1])}
-        if value == FAST_HITS and pair not in one and alive.issuperset(pair) and not ends & taken:
-            made -= {old for old in made if any((k, o[0]) in ends for k, o in (old, old[::-1]))}
+    pair_of = {end: pair for pair in sorted(one) for end in _ends(pair)}
+    for pair in full:
+        former = {pair_of[end] for end in _ends(pair) if end in pair_of}
+        if alive.issuperset(pair) and not any(alive.issuperset(old) for old in former):
+            made -= former
             made.add(pair)
-            taken |= ends
+            pair_of.update(dict.fromkeys(_ends(pair), pair))
     return frozenset(made)
+
+
+def _ends(pair: Pair) -> tuple[tuple[Key, int], tuple[Key, int]]:
+    """Each radar track of a pair, with the other radar."""
+    return (pair[0], pair[1][0]), (pair[1], pair[0][0])
 
 
 def together(keys: Iterable[Key], one: frozenset[Pair]) -> list[list[Key]]:

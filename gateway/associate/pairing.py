@@ -75,8 +75,9 @@ def _near(seen: Tracklets, first: int, second: int, sigma: Floats) -> _Near:
     velocity = seen.state[one, 3:]
     noise[:, :3, :3] += 2.0 * TIME_SIGMA_S**2 * velocity[:, :, None] * velocity[:, None, :]
     by_error = np.concatenate([seen.by_error[one], -seen.by_error[other]], axis=2)
-    told = by_error.transpose(0, 2, 1) @ np.linalg.inv(noise)
-    square = (off[:, None, :] @ np.linalg.inv(noise) @ off[:, :, None])[:, 0, 0]
+    weight = np.linalg.inv(noise)
+    told = by_error.transpose(0, 2, 1) @ weight
+    square = (off[:, None, :] @ weight @ off[:, :, None])[:, 0, 0]
     return _Near(one, other, off, noise, by_error, told @ by_error, (told @ off[:, :, None])[..., 0], square)
 
 
@@ -121,12 +122,9 @@ def _of_two_radars(seen: Tracklets, near: _Near, one: frozenset[Pair], sigma: Fl
     scatter = near.noise + near.by_error @ errors @ near.by_error.transpose(0, 2, 1)
     hit = within & _is_within(off, scatter)
     distance = (off[:, None, :] @ np.linalg.inv(scatter) @ off[:, :, None])[:, 0, 0]
-    rows = np.flatnonzero(hit).tolist()
-    found: dict[Pair, bool | None] = {}
-    for group in _groups(near, rows):
-        if len(group) == 1:
-            found[pairs[group[0]]] = True
-            continue
+    shared = _are_shared(near, hit)
+    found: dict[Pair, bool | None] = {pairs[row]: True for row in np.flatnonzero(hit & ~shared).tolist()}
+    for group in _groups(near, np.flatnonzero(hit & shared).tolist()):
         own = [row for row in group if telling[row]]
         known_of = information - near.information[own].sum(axis=0), vector - near.vector[own].sum(axis=0)
         plain, worse = _plain(near, group, *known_of, distance)
@@ -141,6 +139,12 @@ def _is_within(off: Floats, scatter: Floats) -> Bools:
     parts = [(off[:, part], scatter[:, part, part]) for part in (slice(0, 3), slice(3, 6))]
     square = [(o[:, None, :] @ np.linalg.inv(s) @ o[:, :, None])[:, 0, 0] for o, s in parts]
     return np.asarray((square[0] <= GATE) & (square[1] <= GATE))
+
+
+def _are_shared(near: _Near, hit: Bools) -> Bools:
+    """Which pairs (m,) have a radar track that is also in another hit."""
+    often = [np.bincount(rows[hit], minlength=int(rows.max()) + 1)[rows] > 1 for rows in (near.one, near.other)]
+    return np.asarray(often[0] | often[1])
 
 
 def _groups(near: _Near, rows: Sequence[int]) -> list[list[int]]:

@@ -7,7 +7,8 @@ range, azimuth and elevation is a parabola through the plots that have it, so th
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from bisect import bisect_left, bisect_right
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,7 @@ from gateway.track import Key, RadarTracks
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 WINDOW_S = 6.0  # short enough that an aircraft's turn is a parabola
 SLOW_WINDOW_S = 13.0  # for a radar that turns slowly: nearly all that is remembered of a track
@@ -42,61 +44,90 @@ class Tracklets:
     by_error: Floats  # (n, 6, 3) derivatives by the radar's range, azimuth and elevation
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Plots:
+    """The recent plots of k tracks, m at most, in order of time; where there are fewer, nothing is known."""
+
+    time_s: Floats  # (k, m)
+    polar: Floats  # (k, m, 3)
+    sigma: Floats  # (k, m, 3)
+    count: Ints  # (k,)
+
+    def rows(self, chosen: Bools) -> _Plots:
+        """Those of some tracks."""
+        return _Plots(self.time_s[chosen], self.polar[chosen], self.sigma[chosen], self.count[chosen])
+
+
 def tracklets(tracks: RadarTracks, at: int, radars: Mapping[int, RadarFrame]) -> Tracklets:
     """The radar tracks that have enough plots up to an instant, as they were `WINDOW_S` / 2 before it."""
-    chosen: list[tuple[Key, list[Plot]]] = []
-    for key, plots in tracks.plots.items():
-        if key[0] in radars and (recent := _recent(plots, at)):
-            chosen.append((key, recent))
+    known = [
+        (key, recent) for key, plots in tracks.plots.items() if key[0] in radars and (recent := _recent(plots, at))
+    ]
     middle = at - int(0.5 * WINDOW_S * SECOND)
-    value, rate, spread = _parabolas([plots for _, plots in chosen], middle)
-    radar = np.array([key[0] for key, _ in chosen], np.int64)
+    plots = _gathered([recent for _, recent in known], middle)
+    enough = _are_enough(plots)
+    keys = tuple(key for (key, _), is_told in zip(known, enough.tolist(), strict=True) if is_told)
+    value, rate, spread = _parabolas(plots.rows(enough))
+    radar = np.array([key[0] for key in keys], np.int64)
     state, by_polar = _placed(np.concatenate([value, rate], axis=1), radar, radars)
     covariance = by_polar @ spread @ by_polar.transpose(0, 2, 1)
-    keys = tuple(key for key, _ in chosen)
     return Tracklets(middle, keys, radar, state, covariance, np.ascontiguousarray(by_polar[:, :, :3]))
 
 
-def _recent(plots: tuple[Plot, ...], at: int) -> list[Plot]:
-    """A track's plots of the last seconds; none where they are too few, too old, or say too little."""
-    first, slow = at - int(WINDOW_S * SECOND), at - int(SLOW_WINDOW_S * SECOND)
-    recent: list[Plot] = []
-    for plot in reversed(plots):
-        if plot.at > at:
-            continue
-        if plot.at < slow or (plot.at < first and len(recent) > LEAST_PLOTS):
-            break
-        recent.append(plot)
-    if len(recent) < LEAST_PLOTS:
-        return []
-    span_s = (recent[0].at - recent[-1].at) / SECOND
-    rhythm_s = span_s / (len(recent) - 1)
-    if span_s < LEAST_SPAN_S or (at - recent[0].at) / SECOND > max(SILENT_S, 3.0 * rhythm_s):
-        return []
-    known = [sum(not math.isnan(plot.polar[component]) for plot in recent) for component in (0, 1)]
-    return recent if min(known) >= LEAST_PLOTS else []
+def _recent(plots: tuple[Plot, ...], at: int) -> tuple[Plot, ...]:
+    """A track's plots of the last seconds; none where they are too few."""
+    last = bisect_right(plots, at, key=_at) if plots[-1].at > at else len(plots)
+    first = bisect_left(plots, at - int(WINDOW_S * SECOND), key=_at)
+    if last - first <= LEAST_PLOTS:
+        first = max(last - LEAST_PLOTS - 1, bisect_left(plots, at - int(SLOW_WINDOW_S * SECOND), key=_at))
+    return plots[first:last] if last - first >= LEAST_PLOTS else ()
 
 
-def _parabolas(tracks: list[list[Plot]], middle: int) -> tuple[Floats, Floats, Floats]:
-    """Range, azimuth, elevation of k tracks at an instant (k, 3), their rates (k, 3), and the covariance of both (k, 6, 6)."""
-    count, longest = len(tracks), max((len(plots) for plots in tracks), default=1)
-    polar, sigma = np.full((count, longest, 3), math.nan), np.ones((count, longest, 3))
-    time_s = np.zeros((count, longest))
-    for row, plots in enumerate(tracks):
-        n = len(plots)
-        polar[row, :n] = [plot.polar for plot in plots]
-        sigma[row, :n] = [plot.sigma for plot in plots]
-        time_s[row, :n] = [(plot.at - middle) / SECOND for plot in plots]
+def _at(plot: Plot) -> int:
+    return plot.at
+
+
+def _gathered(tracks: Sequence[tuple[Plot, ...]], middle: int) -> _Plots:
+    """Plots as arrays, their times from an instant on."""
+    count = np.array([len(plots) for plots in tracks], np.int64)
+    longest = int(count.max(initial=1))
+    time_s = np.zeros((len(tracks), longest))
+    polar, sigma = np.full((len(tracks), longest, 3), math.nan), np.ones((len(tracks), longest, 3))
+    if len(tracks):
+        filled = np.arange(longest) < count[:, None]
+        time_s[filled] = np.array([plot.at - middle for plots in tracks for plot in plots]) / SECOND
+        polar[filled] = [plot.polar for plots in tracks for plot in plots]
+        sigma[filled] = [plot.sigma for plots in tracks for plot in plots]
+    return _Plots(time_s, polar, sigma, count)
+
+
+def _are_enough(plots: _Plots) -> Bools:
+    """Which tracks (k,) are told by their plots: of enough of them, and not too old."""
+    newest = np.take_along_axis(plots.time_s, np.maximum(plots.count - 1, 0)[:, None], axis=1)[:, 0]
+    span_s = newest - plots.time_s[:, 0]
+    silence_s = 0.5 * WINDOW_S - newest
+    rhythm_s = span_s / np.maximum(plots.count - 1, 1)
+    measured = (~np.isnan(plots.polar[:, :, :2])).sum(axis=1).min(axis=1)
+    is_heard = silence_s <= np.maximum(SILENT_S, 3.0 * rhythm_s)
+    return np.asarray((measured >= LEAST_PLOTS) & (span_s >= LEAST_SPAN_S) & is_heard)
+
+
+def _parabolas(plots: _Plots) -> tuple[Floats, Floats, Floats]:
+    """Range, azimuth, elevation of k tracks (k, 3), their rates (k, 3), and the covariance of both (k, 6, 6); at time 0."""
+    polar, time_s, count = plots.polar, plots.time_s, len(plots.count)
     known = ~np.isnan(polar)
-    first = np.take_along_axis(polar, known.argmax(axis=1)[:, None, :], axis=1)  # (k, 1, 3) the newest that is known
+    first = np.take_along_axis(polar, known.argmax(axis=1)[:, None, :], axis=1)  # (k, 1, 3) the first that is known
     first = np.where(np.isnan(first), UNKNOWN_ELEVATION_RAD[0], first)
     off = np.where(known, polar - first, 0.0)
     off[:, :, 1] = np.remainder(off[:, :, 1] + math.pi, 2.0 * math.pi) - math.pi
-    weight = np.where(known, 1.0 / sigma**2, 0.0)
-    basis = np.stack([np.ones_like(time_s), time_s, 0.5 * time_s**2], axis=-1)  # (k, m, 3)
-    weighted = weight[:, :, :, None] * basis[:, :, None, :]  # (k, m, component, power)
-    information = (weighted[..., :, None] * basis[:, :, None, None, :]).sum(axis=1)  # (k, component, 3, 3)
-    vector = (weighted * off[..., None]).sum(axis=1)
+    weight = np.where(known, plots.sigma**-2.0, 0.0)
+    information, vector = np.zeros((count, 3, 3, 3)), np.zeros((count, 3, 3))
+    powers = (np.ones_like(time_s), time_s, 0.5 * time_s**2)
+    for row in range(3):
+        vector[:, :, row] = (weight * off * powers[row][:, :, None]).sum(axis=1)
+        for column in range(row, 3):
+            told = (weight * (powers[row] * powers[column])[:, :, None]).sum(axis=1)
+            information[:, :, row, column] = information[:, :, column, row] = told
     distance = np.maximum(first[:, 0, 0], 300.0)
     bend = np.stack([np.ones_like(distance), distance, distance], axis=-1) / ACCELERATION_MPS2
     information[:, :, 2, 2] += bend**2

@@ -8,6 +8,7 @@ instant of the decision on: nothing of the past is worked again.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -98,17 +99,19 @@ def regrouped(
     `groups`: of those that were compared now, which are one. `found`: what reports have associated, and nothing else.
     """
     sky = _sky(lanes, found, spans, tracks, at)
-    joints, told = lanes.joints, list[str]()
+    joints, told, moved = lanes.joints, list[str](), dict[Key, str]()
+    often = {key for key, count in Counter(one.key for one in joints).items() if count >= JOINTS_AT_MOST}
     group_of = {key: place for place, group in enumerate(groups) for key in group}
     for group in groups:
         target = _target(group, sky)
-        moving = [] if target is None else _moving(group, target, sky, joints)
-        for key in moving:
-            name = lanes.lanes[target or 0].name
-            joints = (*closed(joints, key, at), Joint(key, name, at))
+        moving = [] if target is None else _moving(group, target, sky, often)
+        moved |= dict.fromkeys(moving, lanes.lanes[target or 0].name) if moving else {}
         if moving:
             names = ", ".join(name_of(key) for key in group)
             told.append(f"radar tracks {names} are one target: {_who(lanes.lanes[target or 0])}")
+    if moved:
+        ended = (replace(one, until=at) if one.until is None and one.key in moved else one for one in joints)
+        joints = (*ended, *(Joint(key, name, at) for key, name in moved.items()))
     new = {one.key for one in joints if one.since > at - int(FOUND_WITHIN_S * SECOND)}  # they may not be found yet
     for one in lanes.joints:
         mine = lanes.track_of(one.name)
@@ -156,7 +159,7 @@ def _speaks_for(track: int, sky: _Sky) -> bool:
     return silent or any(key in sky.held for key in sky.alive[track])
 
 
-def _moving(group: Sequence[Key], target: int, sky: _Sky, joints: Sequence[Joint]) -> list[Key]:
+def _moving(group: Sequence[Key], target: int, sky: _Sky, often: set[Key]) -> list[Key]:
     """The radar tracks of a group that go over into a system track; of a radars' track all or none do."""
     radars = {key[0] for key in sky.alive[target]}
     moving: list[Key] = []
@@ -164,8 +167,7 @@ def _moving(group: Sequence[Key], target: int, sky: _Sky, joints: Sequence[Joint
         mine = [key for key in sky.alive[track] if key not in sky.held]
         if sky.lanes.lanes[track].aircraft is not None:
             mine = [key for key in mine if key in group]
-        often = any(sum(one.key == key for one in joints) >= JOINTS_AT_MOST for key in mine)
-        if not often and set(mine) <= set(group) and not radars & {key[0] for key in mine}:
+        if not often & set(mine) and set(mine) <= set(group) and not radars & {key[0] for key in mine}:
             moving += mine
             radars |= {key[0] for key in mine}
     return moving
