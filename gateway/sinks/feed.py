@@ -17,7 +17,7 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
-from gateway.sinks.scene.entry import Always, Entry, send
+from gateway.sinks.scene.entry import Always, Made, Piece, send
 from gateway.sinks.serving import free_port
 
 BATCHES_WAITING = 512  # for a viewer that stands still: some 200 s and 20 MB of them, then they are dropped
@@ -63,7 +63,7 @@ class FileFeed:
         self._stream.send_blueprint(blueprint, make_active=False, make_default=True)
         self._write()
 
-    def send(self, entries: Sequence[Entry]) -> None:
+    def send(self, entries: Sequence[Made]) -> None:
         """Write entries; raises OSError when they did not reach the file."""
         send(self._stream, entries)
         self._write()
@@ -137,13 +137,13 @@ class ServedFeed:
             self._stream.flush(timeout_sec=5.0)
         except RuntimeError as error:
             raise OSError(errno.EADDRINUSE, f"the viewer's server could not start on {host}:{port}") from error
-        self._waiting: queue.Queue[Sequence[Entry] | None] = queue.Queue(BATCHES_WAITING)
-        self._kept: list[Entry] = []
+        self._waiting: queue.Queue[Sequence[Made] | None] = queue.Queue(BATCHES_WAITING)
+        self._kept: list[Made] = []
         self._queued = self._taken = 0  # entries so far; each is counted by one thread alone
         self._thread = threading.Thread(target=self._run, name="viewer feed", daemon=True)
         self._thread.start()
 
-    def send(self, entries: Sequence[Entry]) -> None:
+    def send(self, entries: Sequence[Made]) -> None:
         """Queue entries for the viewers, or drop their rows if the queue is full."""
         batch = [*self._kept, *entries]
         try:
@@ -153,9 +153,9 @@ class ServedFeed:
             self._queued += len(batch)
             self._kept = []
         except queue.Full:
-            always: list[Entry] = [entry for entry in batch if isinstance(entry, Always)]
+            always: list[Made] = [entry for entry in batch if isinstance(entry, Always)]
             self._kept = always[-KEPT_AT_MOST:]
-            self.dropped += sum(len(entry.time) for entry in entries if not isinstance(entry, Always))
+            self.dropped += sum(entry.count for entry in entries if isinstance(entry, Piece))
 
     def _run(self) -> None:
         while (batch := self._waiting.get()) is not None:

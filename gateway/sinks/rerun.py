@@ -15,7 +15,7 @@ from gateway.settings import Site
 from gateway.sinks.blueprint import blueprint
 from gateway.sinks.feed import FileFeed, Identity, ServedFeed
 from gateway.sinks.recording import optimise
-from gateway.sinks.scene.entry import Entry
+from gateway.sinks.scene.entry import Entry, made
 from gateway.sinks.scene.flown import Flights
 from gateway.sinks.scene.health import HealthScene
 from gateway.sinks.scene.paths import ApproachScene, PredictScene
@@ -163,8 +163,9 @@ class RerunSink:
         while entries:  # one by one: to free them all at once takes 20 ms, in which the receiving thread gets no turn
             entries.pop()
 
-    def _send(self, entries: list[Entry]) -> None:
+    def _send(self, entries: Sequence[Entry]) -> None:
+        ready = made(entries)
         if self._served:
-            self._served.send(entries)
+            self._served.send(ready)
         if self._file:
-            self._file.send(entries)
+            self._file.send(ready)

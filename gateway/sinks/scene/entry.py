@@ -10,37 +10,27 @@ import numpy as np
 import pyarrow as pa
 import rerun as rr
 from numpy.typing import ArrayLike, NDArray
+from rerun.chunk import Chunk
 
-Floats = NDArray[np.float64]
+from gateway.sinks.scene.columns import Column
+
 Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
-class _Index:
-    """A column of times as Rerun takes it. Made once for all recordings, and without Rerun's own detours: a tenth of drawing."""
+class Index:
+    """A column of times as Rerun takes it. Made once for all recordings, and without Rerun's own detours."""
 
     name: str
     array: pa.Array
 
+    def cut(self, start: int, count: int) -> Index:
+        """Some of the rows; nothing is copied."""
+        return Index(self.name, self.array.slice(start, count))
+
     def timeline_name(self) -> str:
         """What Rerun asks for."""
         return self.name
-
-    def as_arrow_array(self) -> pa.Array:
-        """What Rerun asks for."""
-        return self.array
-
-
-@dataclass(frozen=True, slots=True)
-class _Column:
-    """Likewise a component's column."""
-
-    descriptor: Any
-    array: pa.Array
-
-    def component_descriptor(self) -> Any:
-        """What Rerun asks for."""
-        return self.descriptor
 
     def as_arrow_array(self) -> pa.Array:
         """What Rerun asks for."""
@@ -54,8 +44,8 @@ class Rows:
     path: str
     time: Ints
     step: Ints
-    indexes: tuple[_Index, _Index]
-    columns: tuple[Any, ...]  # of _Column: Rerun takes what answers like its own
+    indexes: tuple[Index, Index]
+    columns: tuple[Any, ...]  # of Column: Rerun takes what answers like its own
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +59,22 @@ class Always:
 Entry = Rows | Always
 
 
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """Rows as Rerun keeps them, and how many they are."""
+
+    chunk: Chunk
+    count: int
+
+    @staticmethod
+    def of(rows: Rows) -> Piece:
+        """The same rows."""
+        return Piece(Chunk.from_columns(rows.path, rows.indexes, rows.columns), len(rows.time))
+
+
+Made = Piece | Always
+
+
 def entity(*parts: str | int) -> str:
     """The path of an entity; parts are escaped, because identities hold colons and slashes."""
     return str(rr.new_entity_path([str(part) for part in parts]))
@@ -79,10 +85,15 @@ def rows(path: str, time: ArrayLike, step: ArrayLike, *columns: Iterable[Any]) -
 
     The rows must come in the order of time already: see `in_order`.
     """
-    flat = tuple(_Column(one.component_descriptor(), one.as_arrow_array()) for part in columns for one in part)
+    flat = tuple(Column(one.component_descriptor(), one.as_arrow_array()) for part in columns for one in part)
     at, number = np.asarray(time, dtype=np.int64), np.asarray(step, dtype=np.int64)
-    utc, count = pa.array(at.view("datetime64[ns]"), pa.timestamp("ns")), pa.array(number, pa.int64())
-    return Rows(path, at, number, (_Index("utc", utc), _Index("step", count)), flat)
+    return Rows(path, at, number, indexes(at, number), flat)
+
+
+def indexes(time: Ints, step: Ints) -> tuple[Index, Index]:
+    """The columns of the two timelines."""
+    utc, count = pa.array(time.view("datetime64[ns]"), pa.timestamp("ns")), pa.array(step, pa.int64())
+    return Index("utc", utc), Index("step", count)
 
 
 def once(path: str, time: int, step: int, *columns: Iterable[Any]) -> Rows:
@@ -90,34 +101,19 @@ def once(path: str, time: int, step: int, *columns: Iterable[Any]) -> Rows:
     return rows(path, [time], [step], *columns)
 
 
-def strips_3d(strips: Sequence[Floats]) -> Any:
-    """Lines (k, 3) in metres as component columns, one strip a row until they are partitioned otherwise."""
-    return rr.LineStrips3D.columns(strips=_lists(strips, 3, np.float32, rr.components.LineStrip3DBatch))
-
-
-def strips_on_map(strips: Sequence[Floats]) -> Any:
-    """Lines (k, 2) in degrees of latitude and longitude, likewise."""
-    return rr.GeoLineStrings.columns(line_strings=_lists(strips, 2, np.float64, rr.components.GeoLineStringBatch))
-
-
-def _lists(strips: Sequence[Floats], width: int, kind: Any, batch: Any) -> Any:
-    """Lines as one Arrow array: Rerun's own conversion takes 30 us a line, this one 1."""
-    offsets = np.concatenate([[0], np.cumsum([len(strip) for strip in strips])]).astype(np.int32)
-    numbers = pa.array(np.concatenate(strips).astype(kind).reshape(-1))
-    wanted = batch._ARROW_DATATYPE
-    points = pa.FixedSizeListArray.from_arrays(numbers, type=wanted.value_type)
-    return pa.ListArray.from_arrays(pa.array(offsets), points, type=wanted)
-
-
 def in_order(time: Ints) -> NDArray[np.intp]:
     """The order that sorts times; equal times keep their order."""
     return np.argsort(time, kind="stable")
 
 
-def send(recording: rr.RecordingStream, entries: Sequence[Entry]) -> None:
-    """Hand entries to a recording stream, in their order."""
+def made(entries: Sequence[Entry]) -> list[Made]:
+    """Entries as recording streams take them; made once for the file and the viewers."""
+    return [entry if isinstance(entry, Always) else Piece.of(entry) for entry in entries]
+
+
+def send(recording: rr.RecordingStream, entries: Sequence[Made]) -> None:
+    """Hand entries to a recording stream: what holds at all times first."""
     for entry in entries:
         if isinstance(entry, Always):
             recording.log(entry.path, *entry.archetypes, static=True)
-        else:
-            recording.send_columns(entry.path, entry.indexes, entry.columns)
+    recording.send_chunks(entry.chunk for entry in entries if isinstance(entry, Piece))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from gateway.observation import Attitude
 from gateway.picture import Picture
 from gateway.settings import Site
 from gateway.sinks.scene.lately import Lately
+from gateway.sinks.scene.sheaf import Sheaf
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -49,6 +51,40 @@ class Flown:
     life: tuple[str, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """What is drawn of the rows of many tracks, track by track: see `Flown` for what each means."""
+
+    runway_m: Floats
+    lat_lon_deg: Floats
+    altitude_m: Floats
+    has_height: Bools
+    pressure_altitude_m: Floats
+    velocity_mps: Floats
+    covariance: Floats
+    modes: Floats
+    bias_m: Floats
+    attitude_rad: Floats
+
+
+class Flock(Sequence[Flown]):
+    """The new rows of many tracks: each by itself, and the columns of all, one track behind the other."""
+
+    def __init__(self, each: Sequence[Flown], sheaf: Sheaf[Flown], columns: Columns) -> None:
+        self.sheaf, self.columns = sheaf, columns
+        self._each = each
+
+    @overload
+    def __getitem__(self, place: int) -> Flown: ...
+    @overload
+    def __getitem__(self, place: slice) -> Sequence[Flown]: ...
+    def __getitem__(self, place: int | slice) -> Flown | Sequence[Flown]:
+        return self._each[place]
+
+    def __len__(self) -> int:
+        return len(self._each)
+
+
 class Flights:
     """Gathers the rows of tracks from pictures; remembers the newest of each and the last attitudes."""
 
@@ -59,54 +95,50 @@ class Flights:
         self._attitudes: dict[str, Floats] = {}  # (n, 4): time ns, roll, pitch, yaw
         self._told: Lately[str] = Lately(self._attitudes.pop)
 
-    def gather(self, pictures: Sequence[Picture]) -> list[Flown]:
+    def gather(self, pictures: Sequence[Picture]) -> Flock:
         """The new rows of each track, tracks in the order of their first row."""
         self._take_attitudes(pictures)
-        parts = [picture.fuse for picture in pictures if len(picture.fuse.time)]
-        if not parts:
-            return []
         steps = [picture.step for picture in pictures if len(picture.fuse.time)]
-        step = np.repeat(steps, [len(part.time) for part in parts])
+        parts = [picture.fuse for picture in pictures if len(picture.fuse.time)] or [p.fuse for p in pictures[:1]]
 
         def column(name: str) -> Floats:
             return np.concatenate([getattr(part, name) for part in parts])
 
-        def text(name: str) -> list[str | None]:
-            return [one for part in parts for one in getattr(part, name)]
+        def text(name: str) -> tuple[str | None, ...]:
+            told = [one for part in parts for one in getattr(part, name)]
+            return tuple(told[row] for row in rows)
 
-        time, track, place = column("time").astype(np.int64), column("track"), column("runway_m")
-        lat_lon = np.degrees(np.stack([column("latitude_rad"), column("longitude_rad")], axis=-1))
-        altitude, height = column("altitude_msl_m"), column("height_m")
-        altitude = np.where(np.isfinite(altitude), altitude, height)
-        has_height = np.asarray(np.isfinite(height))
-        local = column("velocity_mps")
+        time, track, place = column("time").astype(np.int64), column("track").astype(np.int64), column("runway_m")
+        tracks, order = self._new_rows(time, track, np.asarray(np.isfinite(place).all(axis=1)))
+        rows = order.tolist()
+        step = np.repeat(np.array(steps, dtype=np.int64), [len(part.time) for part in parts if len(part.time)])[order]
+        time, height, altitude = time[order], column("height_m")[order], column("altitude_msl_m")[order]
+        local = column("velocity_mps")[order]
         velocity = turn(self._frame.runway_from_enu, np.nan_to_num(local))
         velocity[np.isnan(local[:, 2]), 2] = np.nan
-        pressure = column("pressure_altitude_m")
-        covariance, modes, bias = column("covariance"), column("modes"), column("bias_m")
-        aircraft, radar_track, state = text("aircraft"), text("radar_track"), text("state")
-        callsign, life = text("callsign"), text("life")
-        whole = np.isfinite(place).all(axis=1)
-        found = []
-        for number in dict.fromkeys(track.tolist()):
-            index = self._new_rows(number, np.flatnonzero((track == number) & whole), time)
-            if not len(index):
-                continue
-            who = tuple(aircraft[row] for row in index)
-            found.append(
-                Flown(
-                    number, time[index], step[index], place[index], lat_lon[index], altitude[index], has_height[index],
-                    pressure[index], velocity[index],
-                    covariance[index], modes[index], bias[index],
-                    self._attitude(who, time[index], velocity[index]),
-                    who,
-                    tuple(callsign[row] for row in index),
-                    tuple(radar_track[row] for row in index),
-                    tuple(str(state[row]) for row in index),
-                    tuple(str(life[row]) for row in index),
-                )
-            )  # fmt: skip
-        return found
+        sheaf = Sheaf.of([number for number, _ in tracks], [count for _, count in tracks], time, step)
+        aircraft = text("aircraft")
+        columns = Columns(
+            runway_m=place[order],
+            lat_lon_deg=np.degrees(np.stack([column("latitude_rad")[order], column("longitude_rad")[order]], axis=-1)),
+            altitude_m=np.where(np.isfinite(altitude), altitude, height),
+            has_height=np.asarray(np.isfinite(height)),
+            pressure_altitude_m=column("pressure_altitude_m")[order],
+            velocity_mps=velocity,
+            covariance=column("covariance")[order],
+            modes=column("modes")[order],
+            bias_m=column("bias_m")[order],
+            attitude_rad=self._attitude(aircraft, sheaf, velocity),
+        )
+        callsign, radar_track = text("callsign"), text("radar_track")
+        state, life = (tuple(str(one) for one in text(name)) for name in ("state", "life"))
+        each = []
+        for number, start, end in sheaf.cuts():
+            mine = slice(start, end)
+            numbers = (getattr(columns, name)[mine] for name in Columns.__slots__)
+            words = (part[mine] for part in (aircraft, callsign, radar_track, state, life))
+            each.append(Flown(number, time[mine], step[mine], *numbers, *words))
+        return Flock(each, Sheaf(each, sheaf.ends, time, step), columns)
 
     def newest(self, track: int) -> int:
         """The time of the newest row of a track, ns; long ago for one without rows."""
@@ -116,12 +148,22 @@ class Flights:
         """A track ended: rows of it that come later, and are older, are not drawn any more."""
         self._newest.is_new(track, at)
 
-    def _new_rows(self, track: int, index: NDArray[np.intp], time: Ints) -> NDArray[np.intp]:
-        """Those rows, as they were written, that do not go back behind what was drawn before them."""
-        newest = np.maximum.accumulate(np.concatenate([[self.newest(track)], time[index]]))
-        if len(index):
-            self._newest.is_new(track, int(newest[-1]))
-        return index[time[index] >= newest[:-1]]
+    def _new_rows(self, time: Ints, track: Ints, wanted: Bools) -> tuple[list[tuple[int, int]], NDArray[np.intp]]:
+        """Each track and how many rows are new of it; the rows, track by track, that do not go back behind those before."""
+        numbers = dict.fromkeys(track[wanted].tolist())
+        found, kept = [], [np.empty(0, dtype=np.intp)]
+        together = np.argsort(track, kind="stable")
+        sorted_tracks = track[together]
+        for number in numbers:
+            mine = together[slice(*np.searchsorted(sorted_tracks, [number, number + 1]))]
+            mine = mine[wanted[mine]]
+            newest = np.maximum.accumulate(np.concatenate([[self.newest(number)], time[mine]]))
+            self._newest.is_new(number, int(newest[-1]))
+            mine = mine[time[mine] >= newest[:-1]]
+            if len(mine):
+                found.append((number, len(mine)))
+                kept.append(mine)
+        return found, np.concatenate(kept)
 
     def _take_attitudes(self, pictures: Sequence[Picture]) -> None:
         told: dict[str, list[tuple[float, ...]]] = {}
@@ -136,7 +178,7 @@ class Flights:
             self._told.is_new(aircraft, int(both[-1, 0]))
             self._attitudes[aircraft] = both[np.argsort(both[:, 0], kind="stable")]
 
-    def _attitude(self, aircraft: Sequence[str | None], time: Ints, velocity_mps: Floats) -> Floats:
+    def _attitude(self, aircraft: Sequence[str | None], sheaf: Sheaf[int], velocity_mps: Floats) -> Floats:
         """Roll, pitch, yaw of each row: what was last said, where it is fresh, else course and climb."""
         course = np.arctan2(velocity_mps[:, 1], velocity_mps[:, 0])
         level = np.hypot(velocity_mps[:, 0], velocity_mps[:, 1])
@@ -144,10 +186,12 @@ class Flights:
             level > 1.0, np.arctan2(np.nan_to_num(velocity_mps[:, 2]), level), 0.0
         )  # hovering is not a nose dive
         attitude = np.stack([np.zeros_like(course), climb, self._landing_rad - course], axis=-1)
-        for name in {name for name in aircraft if name in self._attitudes}:
-            told = self._attitudes[str(name)]
-            last = np.searchsorted(told[:, 0], time, side="right") - 1
-            fresh = (last >= 0) & (time - told[last, 0] <= ATTITUDE_NS)
-            fresh &= np.array([one == name for one in aircraft])
-            attitude[fresh] = told[last[fresh], 1:]
+        for _, start, end in sheaf.cuts():
+            names, time = aircraft[start:end], sheaf.time[start:end]
+            for name in {name for name in names if name in self._attitudes}:
+                told = self._attitudes[str(name)]
+                last = np.searchsorted(told[:, 0], time, side="right") - 1
+                fresh = (last >= 0) & (time - told[last, 0] <= ATTITUDE_NS)
+                fresh &= np.array([one == name for one in names])
+                attitude[start:end][fresh] = told[last[fresh], 1:]
         return attitude

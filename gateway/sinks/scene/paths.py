@@ -14,10 +14,11 @@ from gateway.picture import Picture
 from gateway.predict import Predicted
 from gateway.settings import Site
 from gateway.sinks.approach import deviations
-from gateway.sinks.scene import style
-from gateway.sinks.scene.entry import Always, Entry, entity, rows, strips_3d, strips_on_map
-from gateway.sinks.scene.flown import Flown
+from gateway.sinks.scene import columns, style
+from gateway.sinks.scene.entry import Always, Entry, entity
+from gateway.sinks.scene.flown import Flock, Flown
 from gateway.sinks.scene.lately import Lately
+from gateway.sinks.scene.sheaf import Sheaf
 
 Floats = NDArray[np.float64]
 
@@ -31,26 +32,26 @@ class ApproachScene:
         self._runway, self._units = site.runway, style.units_of(site)
         self._named: Lately[int] = Lately()
 
-    def entries(self, flights: Sequence[Flown]) -> list[Entry]:
+    def entries(self, flights: Flock) -> list[Entry]:
         """The rows of those tracks that are on the approach."""
+        all_of = flights.columns
+        off = deviations(self._runway, all_of.runway_m, all_of.velocity_mps[:, 0])
+        known = np.asarray(np.isfinite(off.distance_m))
+        for above in (off.vertical_m, off.vertical_rad):
+            above[~all_of.has_height] = np.nan
+        sheaf = flights.sheaf.where(known)
         entries: list[Entry] = []
-        for flown in flights:
-            off = deviations(self._runway, flown.runway_m, flown.velocity_mps[:, 0])
-            known = np.isfinite(off.distance_m)
-            if not known.any():
-                continue
-            for above in (off.vertical_m, off.vertical_rad):
-                above[~flown.has_height] = np.nan
-            if self._named.is_new(flown.track, int(flown.time[-1])):
+        for flown, _, end in sheaf.cuts():
+            if self._named.is_new(flown.track, int(sheaf.time[end - 1])):
                 entries += self._looks(flown.track)
-            length, distance = self._units.lengths, self._units.distances
-            for path, columns in (
-                (entity("approach", flown.track), (off.vertical_m * length, off.lateral_m * length)),
-                (entity("approach", "angle", flown.track), (np.degrees(off.vertical_rad), np.degrees(off.lateral_rad))),
-                (entity("approach", "distance", flown.track), (off.distance_m * distance,)),
-            ):
-                plotted = rr.Scalars.columns(scalars=np.stack(columns, axis=-1)[known])
-                entries.append(rows(path, flown.time[known], flown.step[known], plotted))
+        length, distance = self._units.lengths, self._units.distances
+        for place, values in (
+            (("approach",), (off.vertical_m * length, off.lateral_m * length)),
+            (("approach", "angle"), (np.degrees(off.vertical_rad), np.degrees(off.lateral_rad))),
+            (("approach", "distance"), (off.distance_m * distance,)),
+        ):
+            plotted = columns.scalars(np.stack(values, axis=-1)[known])
+            entries += sheaf.rows(lambda flown, place=place: entity(*place, flown.track), plotted)  # type: ignore[misc]
         return entries
 
     def _looks(self, track: int) -> list[Entry]:
@@ -84,10 +85,7 @@ class PredictScene:
                 found.setdefault(track, []).append((made, picture.step, strips))
         for flown in flights:
             self._here[flown.track] = flown.runway_m[-1]
-        entries: list[Entry] = []
-        for track, told in found.items():
-            entries += self._rows(track, told)
-        return entries
+        return self._rows(found) if found else []
 
     def end(self, track: int, at: int) -> None:
         """A track ended: what was predicted for it until then is not drawn any more."""
@@ -124,23 +122,24 @@ class PredictScene:
                 return np.asarray(flown.runway_m[row])
         return self._here.get(track)
 
-    def _rows(self, track: int, told: list[tuple[int, int, list[Floats]]]) -> list[Entry]:
-        path = entity("predict", track)
-        look = style.PREDICTED
-        time, step = np.array([one[0] for one in told]), np.array([one[1] for one in told])
-        lengths = [len(strips) for _, _, strips in told]
+    def _rows(self, found: dict[int, list[tuple[int, int, list[Floats]]]]) -> list[Entry]:
+        told = [one for mine in found.values() for one in mine]
         strips = [strip for _, _, part in told for strip in part]
+        counts = [len(part) for _, _, part in told]
         ends = np.cumsum([len(strip) for strip in strips])[:-1]
         latitude, longitude, _ = self._frame.geodetic_from_runway(np.concatenate(strips))
         ground = np.split(np.degrees(np.stack([latitude, longitude], axis=-1)), ends)
         entries: list[Entry] = []
-        if self._looked.is_new(track, int(time[-1])):
-            radius = style.points(0.8)
-            line = rr.LineStrips3D.from_fields(colors=look, radii=radius)
-            entries.append(Always(path, (line, rr.GeoLineStrings.from_fields(colors=look, radii=radius))))
-        scene = strips_3d(strips).partition(lengths)
-        on_map = strips_on_map(ground).partition(lengths)
-        return [*entries, rows(path, time, step, scene, on_map)]
+        radius, look = style.points(0.8), style.PREDICTED
+        for track, mine in found.items():
+            if self._looked.is_new(track, mine[-1][0]):
+                line = rr.LineStrips3D.from_fields(colors=look, radii=radius)
+                on_map = rr.GeoLineStrings.from_fields(colors=look, radii=radius)
+                entries.append(Always(entity("predict", track), (line, on_map)))
+        time, step = [made for made, _, _ in told], [number for _, number, _ in told]
+        sheaf = Sheaf.of(list(found), [len(mine) for mine in found.values()], time, step)
+        drawn = columns.strips_3d(strips, counts), columns.strips_on_map(ground, counts)
+        return [*entries, *sheaf.rows(lambda track: entity("predict", track), *drawn)]
 
 
 def corridor(start: Floats | None, ahead_m: Floats, sigma_m: Floats) -> list[Floats]:

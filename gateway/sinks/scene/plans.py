@@ -13,8 +13,8 @@ from gateway.frames import RunwayFrame
 from gateway.observation import FlightPlan, Intent, PlanPoint
 from gateway.picture import Picture
 from gateway.settings import Site
-from gateway.sinks.scene import style
-from gateway.sinks.scene.entry import Always, Entry, entity, once, strips_3d, strips_on_map
+from gateway.sinks.scene import columns, style
+from gateway.sinks.scene.entry import Always, Entry, entity, once
 from gateway.sinks.scene.flown import Flown
 from gateway.sinks.scene.lately import Lately
 
@@ -83,7 +83,11 @@ class PlanScene:
         along = [row for row, point in enumerate(points) if point.kind != "home"]  # home is no part of the way
         dots = rr.Points3D.columns(positions=place, labels=whats).partition([len(points)])
         flat = rr.GeoPoints.columns(positions=ground).partition([len(points)])
-        lines = [strips_3d([place[along]]), strips_on_map([ground[along]])] if len(along) > 1 else []
+        lines = (
+            [columns.strips_3d([place[along]], [1]), columns.strips_on_map([ground[along]], [1])]
+            if len(along) > 1
+            else []
+        )
         return [*self._looks(path, style.PLAN, 2.0, now), once(path, now, step, dots, flat, *lines)]
 
     def _goal(self, aircraft: str, told: _Told, now: int, step: int) -> list[Entry]:

@@ -16,9 +16,10 @@ from gateway.associate import MultiRadar
 from gateway.frames import RunwayFrame
 from gateway.picture import Picture
 from gateway.settings import Site
-from gateway.sinks.scene import style
-from gateway.sinks.scene.entry import Always, Entry, entity, once, rows
-from gateway.sinks.scene.trail import Trail
+from gateway.sinks.scene import columns, style
+from gateway.sinks.scene.entry import Always, Entry, entity, once
+from gateway.sinks.scene.sheaf import Sheaf
+from gateway.sinks.scene.trail import Trail, grown
 
 Floats = NDArray[np.float64]
 
@@ -44,17 +45,21 @@ class MultiRadarScene:
         step = np.repeat([step for _, step in parts], [len(one.time) for one, _ in parts])
         latitude, longitude, _ = self._frame.geodetic_from_runway(place)
         lat_lon = np.degrees(np.stack([latitude, longitude], axis=-1))
+        order = np.argsort(track, kind="stable")
+        numbers, counts = np.unique(track, return_counts=True)
+        sheaf = Sheaf.of(numbers.tolist(), counts, time[order], step[order])
         entries: list[Entry] = []
-        for number in dict.fromkeys(track.tolist()):
-            mine, path = track == number, entity("track", number)
+        extended = []
+        for number, start, end in sheaf.cuts():
+            path, mine = _path(number), slice(start, end)
             if number not in self._trails:
                 self._trails[number] = Trail(path, "line", style.RADAR, 1.2)
                 entries.append(Always(path, (self._look(number),)))
-            entries += self._trails[number].extend(time[mine], step[mine], place[mine], lat_lon[mine])
-            level = np.hypot(sigma[mine, 0], sigma[mine, 1]) * np.sqrt(0.5)
-            spread = np.stack([level, sigma[mine, 2]], axis=-1) * self._units.lengths
-            entries.append(rows(path, time[mine], step[mine], rr.Scalars.columns(scalars=spread)))
-        return entries
+            positions = sheaf.time[mine], sheaf.step[mine], place[order][mine], lat_lon[order][mine]
+            extended.append((self._trails[number], *positions))
+        level = np.hypot(sigma[:, 0], sigma[:, 1]) * np.sqrt(0.5)
+        spread = np.stack([level, sigma[:, 2]], axis=-1)[order] * self._units.lengths
+        return [*entries, *grown(extended), *sheaf.rows(_path, columns.scalars(spread))]
 
     def _ended(self, pictures: Sequence[Picture]) -> list[Entry]:
         """Those of system tracks that ended leave the scene."""
@@ -71,3 +76,7 @@ class MultiRadarScene:
             f"track {track} radars only, {part} sigma, {self._units.length}" for part in ("horizontal", "vertical")
         ]
         return rr.SeriesLines(names=names, colors=[style.RADAR, style.ANTENNA])
+
+
+def _path(track: int) -> str:
+    return entity("track", track)

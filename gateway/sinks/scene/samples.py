@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
 
-from gateway.sinks.scene.entry import Always, Entry, rows
+from gateway.sinks.scene import columns
+from gateway.sinks.scene.entry import Always, Entry
 from gateway.sinks.scene.lately import Lately
+from gateway.sinks.scene.sheaf import Sheaf
 
 
 class Sample(NamedTuple):
@@ -28,15 +31,22 @@ def plotted(samples: Sequence[Sample], named: Lately[str]) -> list[Entry]:
     for sample in samples:
         found.setdefault(sample.path, []).append(sample)
     entries: list[Entry] = []
+    ordered: list[Sample] = []
+    widths: list[int] = []
     for path, mine in found.items():
         mine.sort(key=lambda sample: sample.time)
         names = max((sample.names for sample in mine), key=len)
         if named.is_new(path, mine[-1].time):
             entries.append(Always(path, (rr.SeriesLines(names=names),)))
-        table = np.full((len(mine), len(names)), np.nan)
-        for row, sample in zip(table, mine, strict=True):
-            row[: len(sample.values)] = sample.values
-        values = rr.Scalars.columns(scalars=table)
-        time, step = [sample.time for sample in mine], [sample.step for sample in mine]
-        entries.append(rows(path, time, step, values))
-    return entries
+        ordered += mine
+        widths += [len(names)] * len(mine)
+    if not ordered:
+        return entries
+    values = [
+        value
+        for sample, width in zip(ordered, widths, strict=True)
+        for value in (*sample.values, *(math.nan,) * (width - len(sample.values)))
+    ]
+    time, step = [sample.time for sample in ordered], [sample.step for sample in ordered]
+    sheaf = Sheaf.of(list(found), [len(mine) for mine in found.values()], time, step)
+    return [*entries, *sheaf.rows(str, columns.scalars_of(np.array(values), widths))]

@@ -7,7 +7,8 @@ deviation need to be seen apart. True proportions are in the 3D scene, true numb
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 import numpy as np
 import rerun as rr
@@ -15,14 +16,16 @@ from numpy.typing import NDArray
 
 from gateway.fuse import Fused
 from gateway.settings import Runway, Site
-from gateway.sinks.scene import style
-from gateway.sinks.scene.entry import Always, Entry, entity, rows
-from gateway.sinks.scene.flown import Flown
+from gateway.sinks.scene import columns, style
+from gateway.sinks.scene.entry import Always, Entry, entity
+from gateway.sinks.scene.flown import Flock, Flown
 from gateway.sinks.scene.lately import Lately
+from gateway.sinks.scene.sheaf import Sheaf
 from gateway.sinks.scene.site import approach_reach_m
 from gateway.sinks.scene.sources import Positions, raw_path
 
 Floats = NDArray[np.float64]
+Key = TypeVar("Key")
 
 STRETCH = 10.0
 ROOT = "/approach/scope"
@@ -72,31 +75,29 @@ class ScopeScene:
         self._site, self._units, self.scope = site, style.units_of(site), Scope(site)
         self._looked: Lately[str] = Lately()
 
-    def entries(self, heard: Sequence[Positions], flights: Sequence[Flown]) -> list[Entry]:
+    def entries(self, heard: Sequence[Positions], flights: Flock) -> list[Entry]:
         """The rows of raw positions and of tracks."""
         entries: list[Entry] = []
         for one in heard:
             colour, size = (style.RADAR, 1.0) if one.is_plot else (style.GPS, 2.0)
-            path = ROOT + raw_path(one.source).removeprefix("/raw")
-            entries += self._dots(path, colour, size, one.time, one.step, one.runway_m, one.has_height)
-        for flown in flights:
-            path = entity("approach", "scope", flown.track)
-            entries += self._dots(path, style.FUSED, 1.2, flown.time, flown.step, flown.runway_m, flown.has_height)
+            entries += self._dots(_raw_at, colour, size, one.sheaf, one.runway_m, one.has_height)
+        all_of = flights.columns
+        entries += self._dots(_fused_at, style.FUSED, 1.2, flights.sheaf, all_of.runway_m, all_of.has_height)
         return entries
 
     def smoothed_entries(self, fused: Fused, step: NDArray[np.int64]) -> list[Entry]:
         """The rows of one smoothed track, in the order of time, on top of the filter's."""
         path = entity("approach", "scope", "smoothed", int(fused.track[0]))
         has_height = np.asarray(np.isfinite(fused.height_m))
-        return self._dots(path, style.SMOOTHED, 0.8, fused.time, step, fused.runway_m, has_height)
+        sheaf = Sheaf.of([path], [len(step)], fused.time, step)
+        return self._dots(str, style.SMOOTHED, 0.8, sheaf, fused.runway_m, has_height)
 
     def _dots(
         self,
-        path: str,
+        path_of: Callable[[Key], str],
         colour: style.Colour,
         size: float,
-        time: NDArray[np.int64],
-        step: NDArray[np.int64],
+        sheaf: Sheaf[Key],
         place: Floats,
         has_height: NDArray[np.bool_],
     ) -> list[Entry]:
@@ -104,14 +105,14 @@ class ScopeScene:
         spots[~has_height, 0] = np.nan
         shown = np.asarray(np.isfinite(spots).all(axis=-1))
         known = np.asarray(shown.any(axis=1))
-        if not known.any():
-            return []
+        seen = sheaf.where(known)
         entries: list[Entry] = []
-        if self._looked.is_new(path, int(time[-1])):
-            look = rr.Points2D.from_fields(colors=colour, radii=style.points(size), draw_order=_ABOVE.get(colour, 30.0))
-            entries.append(Always(path, (look,)))
-        dots = rr.Points2D.columns(positions=spots[shown]).partition(shown[known].sum(axis=1))
-        return [*entries, rows(path, time[known], step[known], dots)]
+        for key, _, end in seen.cuts():
+            if self._looked.is_new(path_of(key), int(seen.time[end - 1])):
+                above = _ABOVE.get(colour, 30.0)
+                look = rr.Points2D.from_fields(colors=colour, radii=style.points(size), draw_order=above)
+                entries.append(Always(path_of(key), (look,)))
+        return [*entries, *seen.rows(path_of, columns.points_2d(spots[shown], shown[known].sum(axis=1)))]
 
     def site_entries(self) -> list[Always]:
         """The lines of the screen: what stands still."""
@@ -167,6 +168,14 @@ class ScopeScene:
             texts.append(f"{distance * units.distances:.0f} {units.distance}")
             places.append(scope.elevation(along[:1], np.zeros(1))[0])
         return texts, np.array(places).reshape(-1, 2)
+
+
+def _raw_at(source: str) -> str:
+    return ROOT + raw_path(source).removeprefix("/raw")
+
+
+def _fused_at(flown: Flown) -> str:
+    return entity("approach", "scope", flown.track)
 
 
 def _lines(strips: list[Floats], colour: style.Colour, width: float) -> rr.LineStrips2D:

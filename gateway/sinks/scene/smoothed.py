@@ -13,7 +13,7 @@ from gateway.fuse import Fused
 from gateway.settings import Site
 from gateway.sinks.scene import style
 from gateway.sinks.scene.entry import Always, Entry, entity, once, rows
-from gateway.sinks.scene.trail import Trail
+from gateway.sinks.scene.trail import Trail, grown
 
 Ints = NDArray[np.int64]
 
@@ -40,7 +40,7 @@ class SmoothedScene:
         sigma = np.sqrt(np.stack([0.5 * (variance[:, 0] + variance[:, 1]), upright], axis=-1)) * self._units.lengths
         entries.append(rows(path, fused.time, step, *place))
         entries.append(rows(self._sigma(track), fused.time, step, rr.Scalars.columns(scalars=sigma)))
-        return entries + self._trail.extend(fused.time, step, fused.runway_m, lat_lon)
+        return entries + grown([(self._trail, fused.time, step, fused.runway_m, lat_lon)])
 
     def end(self, track: int, at: int, step: int) -> list[Entry]:
         """A track that ended leaves the scene."""

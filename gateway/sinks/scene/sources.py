@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,10 +13,11 @@ from gateway.frames import RunwayFrame
 from gateway.observation import GpsReport, RadarPlot, Truth
 from gateway.picture import Picture
 from gateway.settings import Site
-from gateway.sinks.scene import style
-from gateway.sinks.scene.entry import Always, Entry, entity, in_order, rows
+from gateway.sinks.scene import columns, style
+from gateway.sinks.scene.entry import Always, Entry, entity
 from gateway.sinks.scene.lately import Lately
-from gateway.sinks.scene.trail import Trail
+from gateway.sinks.scene.sheaf import Sheaf
+from gateway.sinks.scene.trail import Kind, Trail, grown
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -32,12 +32,10 @@ def raw_path(source: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Positions:
-    """What one source said of places, in the order of time: an aircraft's own, or a radar track's plots."""
+    """What sources said of places: the positions of aircraft, or the plots of radar tracks, n in all."""
 
-    source: str
     is_plot: bool
-    time: Ints  # (n,) ns
-    step: Ints  # (n,)
+    sheaf: Sheaf[str]  # by source: an aircraft, or a radar track "1/3"
     runway_m: Floats  # (n, 3)
     has_height: Bools  # (n,); without one the third coordinate is a guess
 
@@ -54,9 +52,9 @@ def raw_positions(pictures: Sequence[Picture]) -> list[Positions]:
         known = np.concatenate([np.ones(0, np.bool_), *(part.report_has_height for part in parts)])
         has_height = np.ones(len(time), dtype=np.bool_) if is_plot else known
         step = np.repeat([picture.step for picture in pictures], [len(part) for part in named])
-        for name, index in _by_name(names, np.asarray(np.isfinite(place).all(axis=1))):
-            index = index[in_order(time[index])]
-            found.append(Positions(name, is_plot, time[index], step[index], place[index], has_height[index]))
+        sheaf, order = _by_name(names, np.asarray(np.isfinite(place).all(axis=1)), time, step)
+        if len(order):
+            found.append(Positions(is_plot, sheaf, place[order], has_height[order]))
     return found
 
 
@@ -75,7 +73,7 @@ class SourceScene:
         entries: list[Entry] = []
         for one in heard:
             colour = style.RADAR if one.is_plot else style.GPS
-            entries += self._positions(raw_path(one.source), colour, one.time, one.step, one.runway_m, "points")
+            entries += self._positions(raw_path, colour, one.sheaf, one.runway_m, "points")
         return [*entries, *self._lateness(pictures), *self._truth(pictures)]
 
     def _truth(self, pictures: Sequence[Picture]) -> list[Entry]:
@@ -87,12 +85,9 @@ class SourceScene:
         place = self._frame.runway_from_geodetic(latitude, longitude, [self._height_m(truth) for truth, _ in told])
         time = np.array([truth.valid_at for truth, _ in told], dtype=np.int64)
         step = np.array([step for _, step in told], dtype=np.int64)
-        entries: list[Entry] = []
         known = np.asarray(np.isfinite(place).all(axis=1))
-        for name, index in _by_name([truth.aircraft for truth, _ in told], known):
-            path = entity("truth", name)
-            entries += self._positions(path, style.TRUTH, time[index], step[index], place[index], "line")
-        return entries
+        sheaf, order = _by_name([truth.aircraft for truth, _ in told], known, time, step)
+        return self._positions(lambda name: entity("truth", name), style.TRUTH, sheaf, place[order], "line")
 
     def _height_m(self, truth: Truth) -> float:
         if truth.height_m is not None:
@@ -100,45 +95,59 @@ class SourceScene:
         return np.nan if truth.altitude_msl_m is None else truth.altitude_msl_m + self._geoid_m
 
     def _positions(
-        self, path: str, colour: style.Colour, time: Ints, step: Ints, place: Floats, kind: str
+        self, path_of: Callable[[str], str], colour: style.Colour, sheaf: Sheaf[str], place: Floats, kind: Kind
     ) -> list[Entry]:
-        """The position of one source, now and where it was; in the scene and on the map."""
-        order = in_order(time)
-        time, step, place = time[order], step[order], place[order]
+        """The positions of sources, now and where they were; in the scene and on the map."""
+        if not len(place):
+            return []
         latitude, longitude, _ = self._frame.geodetic_from_runway(place)
         lat_lon = np.degrees(np.stack([latitude, longitude], axis=-1))
+        line = kind == "line"
         entries: list[Entry] = []
-        if self._drawn.is_new(path, int(time[-1])):
-            line = kind == "line"
-            self._trails[path] = Trail(path, "line" if line else "points", colour, 1.0 if line else 0.8)
-            look = rr.Points3D.from_fields(colors=colour, radii=style.points(2.0 if line else 3.5))
-            ground = rr.GeoPoints.from_fields(colors=colour, radii=style.points(2.0 if line else 3.0))
-            entries.append(Always(path, (look, ground)))
-        here = rr.Points3D.columns(positions=place)
-        entries.append(rows(path, time, step, here, rr.GeoPoints.columns(positions=lat_lon)))
-        return entries + self._trails[path].extend(time, step, place, lat_lon)
+        extended = []
+        for name, start, end in sheaf.cuts():
+            path, mine = path_of(name), slice(start, end)
+            if self._drawn.is_new(path, int(sheaf.time[end - 1])):
+                self._trails[path] = Trail(path, kind, colour, 1.0 if line else 0.8)
+                look = rr.Points3D.from_fields(colors=colour, radii=style.points(2.0 if line else 3.5))
+                ground = rr.GeoPoints.from_fields(colors=colour, radii=style.points(2.0 if line else 3.0))
+                entries.append(Always(path, (look, ground)))
+            extended.append((self._trails[path], sheaf.time[mine], sheaf.step[mine], place[mine], lat_lon[mine]))
+        here = sheaf.rows(path_of, columns.points_3d(place), columns.points_on_map(lat_lon))
+        return [*entries, *here, *grown(extended)]
 
     def _lateness(self, pictures: Sequence[Picture]) -> list[Entry]:
         """How long after its validity each observation was heard: what alignment has to bridge."""
-        late: dict[str, list[tuple[int, int, float]]] = defaultdict(list)
-        for picture in pictures:
-            for one in picture.observations:
-                if isinstance(one, GpsReport | RadarPlot):
-                    source = one.aircraft if isinstance(one, GpsReport) else f"radar {one.radar}"
-                    late[source].append((one.valid_at, picture.step, 1e-9 * (one.received_at - one.valid_at)))
+        told = [
+            (
+                one.aircraft if isinstance(one, GpsReport) else f"radar {one.radar}",
+                one.valid_at,
+                picture.step,
+                one.received_at,
+            )
+            for picture in pictures
+            for one in picture.observations
+            if isinstance(one, GpsReport | RadarPlot)
+        ]
+        if not told:
+            return []
+        names, *numbers = zip(*told, strict=True)
+        time, step, heard = (np.array(column, dtype=np.int64) for column in numbers)
+        sheaf, order = _by_name(names, np.ones(len(names), dtype=np.bool_), time, step)
         entries: list[Entry] = []
-        for source, told in late.items():
-            path = entity("align", source)
-            if self._named.is_new(source, told[-1][0]):
-                entries.append(Always(path, (rr.SeriesLines(names=f"{source} heard after, s"),)))
-            time, step, lateness = (np.array(column) for column in zip(*sorted(told), strict=True))
-            entries.append(rows(path, time, step, rr.Scalars.columns(scalars=lateness)))
-        return entries
+        for source, _, end in sheaf.cuts():
+            if self._named.is_new(source, int(sheaf.time[end - 1])):
+                look = rr.SeriesLines(names=f"{source} heard after, s")
+                entries.append(Always(entity("align", source), (look,)))
+        lateness = columns.scalars(np.asarray(1e-9 * (heard - time)[order], dtype=np.float64))
+        return [*entries, *sheaf.rows(lambda source: entity("align", source), lateness)]
 
 
-def _by_name(names: Sequence[str], wanted: NDArray[np.bool_]) -> list[tuple[str, NDArray[np.intp]]]:
-    """The indexes of the wanted rows of each name, names in the order of their first row."""
-    found: dict[str, list[int]] = {}
-    for index in np.flatnonzero(wanted).tolist():
-        found.setdefault(names[index], []).append(index)
-    return [(name, np.array(index, dtype=np.intp)) for name, index in found.items()]
+def _by_name(names: Sequence[str], wanted: Bools, time: Ints, step: Ints) -> tuple[Sheaf[str], NDArray[np.intp]]:
+    """The wanted rows of each name in the order of time, names in the order of their first row; and their indexes."""
+    numbers: dict[str, int] = {}
+    group = np.array([numbers.setdefault(name, len(numbers)) for name in names], dtype=np.int64)[wanted]
+    order = np.flatnonzero(wanted)[np.lexsort((time[wanted], group))]
+    counts = np.bincount(group, minlength=len(numbers))
+    keys = [name for name, number in numbers.items() if counts[number]]
+    return Sheaf.of(keys, counts[counts > 0], time[order], step[order]), order

@@ -7,7 +7,6 @@ to the runway, at least 40 m and at most 1/40 of the approach that is drawn: see
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,15 +15,17 @@ from numpy.typing import NDArray
 
 from gateway.frames import RunwayFrame
 from gateway.settings import Site
-from gateway.sinks.scene import style
+from gateway.sinks.scene import columns, style
 from gateway.sinks.scene.attitude import ellipsoid, quaternion_from_attitude
-from gateway.sinks.scene.entry import Always, Entry, entity, rows, strips_3d
-from gateway.sinks.scene.flown import Flown
+from gateway.sinks.scene.entry import Always, Entry, entity, rows
+from gateway.sinks.scene.flown import Flock, Flown
 from gateway.sinks.scene.lately import BEFORE_ALL
 from gateway.sinks.scene.site import approach_reach_m
-from gateway.sinks.scene.trail import Trail
+from gateway.sinks.scene.trail import Trail, grown
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Words = NDArray[np.uint32]
 
 LABEL_NS = 1_000_000_000  # a label is text in every row: once a second is as often as a person reads
 ELLIPSOID_SIGMAS = 3.0
@@ -58,22 +59,26 @@ class TrackScene:
         self._longest_m = max(approach_reach_m(site) / 40.0, 40.0)
         self._drawn: dict[int, _Drawn] = {}
 
-    def entries(self, flights: Sequence[Flown]) -> list[Entry]:
+    def entries(self, flights: Flock) -> list[Entry]:
         """What these rows add to the scene, the map and the plots."""
-        entries: list[Entry] = []
+        if not flights:
+            return []
+        looks: list[Entry] = []
         for flown in flights:
             if flown.track not in self._drawn:
                 trail = Trail(entity("fuse", flown.track), "line", style.FUSED, 2.0)
                 self._drawn[flown.track] = _Drawn(trail)
-                entries += self._looks(flown.track)
-            drawn = self._drawn[flown.track]
-            entries += self._here(flown)
-            entries += self._symbol(flown)
-            entries += self._label(flown, drawn)
-            entries += self._plots(flown, drawn)
-            entries += self._states(flown, drawn)
-            entries += drawn.trail.extend(flown.time, flown.step, flown.runway_m, flown.lat_lon_deg)
-        return entries
+                looks += self._looks(flown.track)
+        colours = _colours(flights)
+        return [
+            *looks,
+            *self._here(flights, colours),
+            *self._symbol(flights, colours),
+            *self._labels(flights),
+            *self._plots(flights),
+            *self._states(flights),
+            *grown((self._drawn[f.track].trail, f.time, f.step, f.runway_m, f.lat_lon_deg) for f in flights),
+        ]
 
     def forget(self, track: int) -> None:
         """A track ended; its number is never used again."""
@@ -116,57 +121,57 @@ class TrackScene:
             ),
         ]
 
-    def _here(self, flown: Flown) -> list[Entry]:
-        units = self._units
-        speed = np.hypot(flown.velocity_mps[:, 0], flown.velocity_mps[:, 1]) * units.speeds
-        sink = -flown.velocity_mps[:, 2] * units.climbs
+    def _here(self, flights: Flock, colours: Words) -> list[Entry]:
+        units, all_of = self._units, flights.columns
+        speed = np.hypot(all_of.velocity_mps[:, 0], all_of.velocity_mps[:, 1]) * units.speeds
+        sink = -all_of.velocity_mps[:, 2] * units.climbs
         return [
-            rows(
-                entity("fuse", flown.track),
-                flown.time,
-                flown.step,
-                rr.Points3D.columns(positions=flown.runway_m, colors=_colours(flown)),
-                rr.GeoPoints.columns(positions=flown.lat_lon_deg, colors=_colours(flown)),
-                rr.Scalars.columns(scalars=np.stack([speed, sink], axis=-1)),
+            *flights.sheaf.rows(
+                lambda flown: entity("fuse", flown.track),
+                columns.points_3d(all_of.runway_m),
+                columns.points_on_map(all_of.lat_lon_deg),
+                columns.point_colours(colours),
+                columns.scalars(np.stack([speed, sink], axis=-1)),
             )
         ]
 
-    def _symbol(self, flown: Flown) -> list[Entry]:
-        path = entity("fuse", flown.track)
-        roll, pitch, yaw = flown.attitude_rad.T
+    def _symbol(self, flights: Flock, colours: Words) -> list[Entry]:
+        place, sheaf = flights.columns.runway_m, flights.sheaf
+        roll, pitch, yaw = flights.columns.attitude_rad.T
         quaternion = quaternion_from_attitude(roll, pitch, yaw, self._frame.runway.landing_compass_rad)
-        length = np.clip(0.1 * np.linalg.norm(flown.runway_m, axis=-1), 40.0, self._longest_m)
-        covariance = flown.covariance.reshape(-1, 6, 6).copy()
-        flat = ~flown.has_height  # a guess's hundreds of metres would hide everything else
+        length = np.clip(0.1 * np.linalg.norm(place, axis=-1), 40.0, self._longest_m)
+        covariance = flights.columns.covariance.reshape(-1, 6, 6).copy()
+        flat = ~flights.columns.has_height  # a guess's hundreds of metres would hide everything else
         covariance[flat, 2, :] = covariance[flat, :, 2] = 0.0
         half, axes = ellipsoid(self._frame, covariance, ELLIPSOID_SIGMAS)
-        placed = rr.Transform3D.columns(
-            translation=flown.runway_m, quaternion=quaternion, scale=np.repeat(length[:, None], 3, axis=1)
-        )
-        colours = _colours(flown)
-        shape = rr.Ellipsoids3D.columns(centers=flown.runway_m, half_sizes=half, quaternions=axes, colors=colours)
+        placed = columns.poses(place, quaternion, length)
         return [
-            rows(f"{path}/symbol", flown.time, flown.step, placed, rr.Mesh3D.columns(albedo_factor=colours)),
-            rows(f"{path}/ellipsoid", flown.time, flown.step, shape),
+            *sheaf.rows(lambda f: f"{entity('fuse', f.track)}/symbol", placed, columns.mesh_colours(colours)),
+            *sheaf.rows(
+                lambda f: f"{entity('fuse', f.track)}/ellipsoid", columns.ellipsoids(place, half, axes, colours)
+            ),
         ]
 
-    def _label(self, flown: Flown, drawn: _Drawn) -> list[Entry]:
+    def _labels(self, flights: Flock) -> list[Entry]:
         """Who it is, how high, how fast: the data block of a controller's screen."""
-        chosen, texts = [], []
-        for row, now in enumerate(flown.time.tolist()):
-            told = self._seen(flown, row)
-            if now - drawn.labelled < LABEL_NS and told == drawn.labelled_state:
-                continue
-            drawn.labelled, drawn.labelled_state = now, told
-            chosen.append(row)
-            texts.append(self._block(flown, row))
-        if not chosen:
+        chosen = np.zeros(len(flights.sheaf.time), dtype=np.bool_)
+        texts = []
+        for flown, start, _ in flights.sheaf.cuts():
+            drawn = self._drawn[flown.track]
+            for row, now in enumerate(flown.time.tolist()):
+                told = self._seen(flown, row)
+                if now - drawn.labelled < LABEL_NS and told == drawn.labelled_state:
+                    continue
+                drawn.labelled, drawn.labelled_state = now, told
+                chosen[start + row] = True
+                texts.append(self._block(flown, row))
+        if not texts:
             return []
-        place = flown.runway_m[chosen]
-        block = rr.Points3D.columns(positions=place, labels=texts)
+        place = flights.columns.runway_m[chosen]
         # a line down to the runway's plane: without it nobody sees how high, or over which point of the ground
-        drop = strips_3d(list(np.stack([place, place * [1.0, 1.0, 0.0]], axis=1)))
-        return [rows(f"{entity('fuse', flown.track)}/label", flown.time[chosen], flown.step[chosen], block, drop)]
+        drop = columns.strips_3d(np.stack([place, place * [1.0, 1.0, 0.0]], axis=1), np.ones(len(texts), np.int64))
+        block = (*columns.points_3d(place), *columns.labels(texts))
+        return [*flights.sheaf.where(chosen).rows(lambda f: f"{entity('fuse', f.track)}/label", block, drop)]
 
     def _block(self, flown: Flown, row: int) -> str:
         """Two lines of text; a pressure altitude is named as one, because it is no height."""
@@ -186,47 +191,59 @@ class TrackScene:
             parts.append(f"{'↑' if up >= 0.0 else '↓'}{abs(up) * units.climbs:.{digits}f} {units.climb}")
         return f"{who} {self._seen(flown, row)}\n{' '.join(parts)}"
 
-    def _plots(self, flown: Flown, drawn: _Drawn) -> list[Entry]:
+    def _plots(self, flights: Flock) -> list[Entry]:
         """Sigmas, mode probabilities and the error of the position source, where the estimator has them."""
-        track, units = flown.track, self._units
-        variance = flown.covariance.reshape(-1, 6, 6)[:, [0, 1, 2], [0, 1, 2]]
+        units, all_of = self._units, flights.columns
+        variance = all_of.covariance.reshape(-1, 6, 6)[:, [0, 1, 2], [0, 1, 2]]
         horizontal = np.sqrt(np.maximum(0.5 * (variance[:, 0] + variance[:, 1]), 0.0))
-        vertical = np.where(flown.has_height, np.sqrt(np.maximum(variance[:, 2], 0.0)), np.nan)
+        vertical = np.where(all_of.has_height, np.sqrt(np.maximum(variance[:, 2], 0.0)), np.nan)
         sigma = np.stack([horizontal, vertical], axis=-1) * units.lengths
-        aircraft = next((name for name in flown.aircraft if name), None)
-        kinds = [
-            ("sigma", entity("fuse", "sigma", track), sigma, ("horizontal", "vertical"), f" sigma, {units.length}"),
-            ("modes", entity("fuse", "modes", track), flown.modes, ("straight", "left", "right"), " probability"),
+        bias = all_of.bias_m * units.lengths
+        named = np.array([aircraft is not None for flown in flights for aircraft in _same(flown)], dtype=np.bool_)
+        return [
+            *self._plot(flights, "sigma", sigma, ("horizontal", "vertical"), f" sigma, {units.length}"),
+            *self._plot(flights, "modes", all_of.modes, ("straight", "left", "right"), " probability"),
+            *self._plot(flights, "bias", bias, ("east", "north", "up"), f" error, {units.length}", named),
         ]
-        if aircraft is not None:
-            path = entity("register", "gps", aircraft)
-            kinds.append(
-                ("bias", path, flown.bias_m * units.lengths, ("east", "north", "up"), f" error, {units.length}")
-            )
-        entries: list[Entry] = []
-        for kind, path, values, names, quantity in kinds:
-            known = np.isfinite(values[:, 0])
-            if not known.any():
-                continue
-            if kind not in drawn.named:
-                drawn.named.add(kind)
-                whose = aircraft if kind == "bias" else f"track {track}"
-                titles = [f"{whose} {name}{quantity}" for name in names]
-                entries.append(Always(path, (rr.SeriesLines(names=titles, colors=style.AXES[: len(names)]),)))
-            plotted = rr.Scalars.columns(scalars=values[known])
-            entries.append(rows(path, flown.time[known], flown.step[known], plotted))
-        return entries
 
-    def _states(self, flown: Flown, drawn: _Drawn) -> list[Entry]:
-        chosen = []
-        for row, state in enumerate(flown.state):
-            if state != drawn.state:
-                chosen.append(row)
-                drawn.state = state
-        if not chosen:
-            return []
-        changes = rr.StateChange.columns(state=[flown.state[row] for row in chosen])
-        return [rows(entity("fuse", "state", flown.track), flown.time[chosen], flown.step[chosen], changes)]
+    def _plot(
+        self,
+        flights: Flock,
+        kind: str,
+        values: Floats,
+        names: tuple[str, ...],
+        quantity: str,
+        wanted: Bools | None = None,
+    ) -> list[Entry]:
+        known = np.asarray(np.isfinite(values[:, 0]))
+        if wanted is not None:
+            known &= wanted
+        sheaf = flights.sheaf.where(known)
+        entries: list[Entry] = []
+        for flown in sheaf.keys:
+            if kind not in (drawn := self._drawn[flown.track]).named:
+                drawn.named.add(kind)
+                whose = _aircraft(flown) if kind == "bias" else f"track {flown.track}"
+                titles = [f"{whose} {name}{quantity}" for name in names]
+                look = rr.SeriesLines(names=titles, colors=style.AXES[: len(names)])
+                entries.append(Always(_plotted_at(kind, flown), (look,)))
+        return [*entries, *sheaf.rows(lambda flown: _plotted_at(kind, flown), columns.scalars(values[known]))]
+
+    def _states(self, flights: Flock) -> list[Entry]:
+        entries: list[Entry] = []
+        for flown in flights:
+            drawn = self._drawn[flown.track]
+            if drawn.state == flown.state[-1] and flown.state.count(drawn.state) == len(flown.state):
+                continue
+            chosen = []
+            for row, state in enumerate(flown.state):
+                if state != drawn.state:
+                    chosen.append(row)
+                    drawn.state = state
+            changes = rr.StateChange.columns(state=[flown.state[row] for row in chosen])
+            path = entity("fuse", "state", flown.track)
+            entries.append(rows(path, flown.time[chosen], flown.step[chosen], changes))
+        return entries
 
     def _seen(self, flown: Flown, row: int) -> str:
         """Which sources see it; whether it is to be believed yet; how far off it may be by now, where none does."""
@@ -240,6 +257,25 @@ class TrackScene:
         return f"{state} ± {off:.0f} {self._units.length}"
 
 
-def _colours(flown: Flown) -> list[style.Colour]:
+def _aircraft(flown: Flown) -> str | None:
+    """What flies there, as far as these rows say it."""
+    return next((name for name in flown.aircraft if name), None)
+
+
+def _same(flown: Flown) -> tuple[str | None, ...]:
+    """Of each row, what flies there according to all of them."""
+    return (_aircraft(flown),) * len(flown.time)
+
+
+def _plotted_at(kind: str, flown: Flown) -> str:
+    """Where that is plotted of a track: the error of a position source with what else is known of errors."""
+    aircraft = _aircraft(flown)
+    if kind == "bias" and aircraft is not None:
+        return entity("register", "gps", aircraft)
+    return entity("fuse", kind, flown.track)
+
+
+def _colours(flights: Flock) -> Words:
     """A tentative track is dim, one that coasts is pale."""
-    return [style.LIVES[life] for life in flown.life]
+    shades = {life: columns.packed(colour) for life, colour in style.LIVES.items()}
+    return np.array([shades[life] for flown in flights for life in flown.life], dtype=np.uint32)
