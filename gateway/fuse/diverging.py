@@ -3,24 +3,35 @@
 A measurement that lies far out pulls no more than a bounded amount, and one in between that fits shows that the filter is
 right. Where several in a row lie far out, whatever their source, it is the filter that is wrong: it would follow all the
 same, but slowly, and at a speed that nothing flies. A state that is no number, or is surer than sure, is lost at once.
+
+What is lost again soon after may have been begun with a velocity that is not that of the positions (another sign, another
+unit, or none where the aircraft flies). Then velocities of its reports are left out until they fit what their positions say.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix
 from gateway.estimators.kalman import Estimate
 from gateway.fuse.events import Event, Measure
+
+Floats = NDArray[np.float64]
 
 IN_A_ROW = 5  # far measurements that no good one came between
 FEW, LONG_S = 3, 10.0  # or so many over so long: with seconds between them a filter catches up by chance, at any speed
 # What a hard manoeuvre does to a filter that is sure of itself is not a loss: 1 g for as long as nothing fits, and 30 m.
 MANOEUVRE_MPS2, NEAR_M = 10.0, 30.0
 
-_MOVING = np.arange(6)
+AGAIN_S, AGAIN_INTERVALS = 10.0, 8  # lost again within so long, or so many intervals between measurements
+DOUBTS = 10  # velocities in a row that must fit before they are believed again
+KNOWN_MPS, FITS_SIGMA = 10.0, 3.0  # a velocity that is not known so well fits anything
+
+_MOVING, _SPEEDS = np.arange(6), np.arange(3, 6)
 
 
 def far_row(base: Event) -> tuple[int, int]:
@@ -49,6 +60,37 @@ def why(event: Event, first: Estimate) -> str | None:
         return None
     away = f"{off_m:.0f} m" if off_m < 1000.0 else f"{off_m / 1000.0:.1f} km"
     return f"its last {event.far_off} measurements were all far from where it was expected, the newest by {away}"
+
+
+def lost_again(event: Event) -> bool:
+    """Whether a filter that is lost began anew only lately."""
+    return event.at - event.restarted_at <= max(int(AGAIN_S * SECOND), AGAIN_INTERVALS * event.interval)
+
+
+def believed(base: Event, measure: Measure) -> Measure:
+    """A measurement as the filter takes it: without its velocity while velocities of this track's reports are doubted."""
+    return without_velocity(measure) if base.doubts else measure
+
+
+def without_velocity(measure: Measure) -> Measure:
+    """A report without its velocity; a plot has none."""
+    if not isinstance(measure, Fix):
+        return measure
+    nothing = np.full(3, math.nan)
+    local = None if measure.local is None else replace(measure.local, velocity_mps=nothing)
+    return replace(measure, velocity_mps=nothing, local=local)
+
+
+def doubts_after(doubts: int, measure: Measure, mean: Floats, covariance: Floats) -> int:
+    """Doubts that are left after a measurement and the state with its position worked in: none after so many that fit."""
+    if not isinstance(measure, Fix) or np.isnan(measure.velocity_mps).any():
+        return doubts
+    variance = covariance[_SPEEDS, _SPEEDS]
+    if variance.max() > KNOWN_MPS**2:
+        return DOUBTS
+    off = np.abs(measure.velocity_mps - mean[_SPEEDS])
+    fits = (off <= FITS_SIGMA * np.sqrt(variance + measure.velocity_sigma_mps**2)).all()
+    return doubts - 1 if fits else DOUBTS
 
 
 def is_sound(after: Estimate) -> bool:

@@ -62,6 +62,8 @@ class Event:
     far_off: int = 0  # measurements in a row, this one included, that were far from where the track was expected
     far_since: int = NEVER  # when the last one before them was valid
     restarted: str | None = None  # why the filter began anew with this measurement; None = it went on
+    restarted_at: int = NEVER  # when it last did
+    doubts: int = 0  # velocities of reports that must fit before they are believed again
     score: float = 0.0  # how much speaks for one thing that flies (agreement.py); infinite = confirmed
 
     residual: Residual | None = None  # None: of the first measurement, and of an estimator that does not tell

@@ -11,7 +11,18 @@ from numpy.typing import NDArray
 from gateway.align import SECOND, Fix, Plot
 from gateway.estimators.kalman import Estimate
 from gateway.fuse.agreement import score_after
-from gateway.fuse.diverging import can_begin, far_row, is_sound, may_be_lost, why
+from gateway.fuse.diverging import (
+    DOUBTS,
+    believed,
+    can_begin,
+    doubts_after,
+    far_row,
+    is_sound,
+    lost_again,
+    may_be_lost,
+    why,
+    without_velocity,
+)
 from gateway.fuse.estimating import Estimator, Group, InteractingModels, SingleModel, stacked
 from gateway.fuse.events import NEVER, Belief, Event, Job, Measure, Near, Neighbour, Residual, rank
 from gateway.fuse.light import LightFilter
@@ -68,7 +79,7 @@ def _advance(
     """One measurement for each of some tracks: those with one formula and one radar are worked in together."""
     literal = model.weighting == "literal"
     events: dict[int, Event] = {}
-    groups: dict[tuple[str, int], list[tuple[int, Event, Measure, Near | None]]] = {}
+    groups: dict[tuple[str, int], list[tuple[int, Event, Measure, Measure, Near | None]]] = {}
     for row, (base, measure) in enumerate(zip(bases, measures, strict=True)):
         if base is None:
             first, belief = estimator.begin(measure)
@@ -76,13 +87,13 @@ def _advance(
             events[row] = _event(measure, first.mean[0], first.covariance[0], nothing, belief, None)
             continue
         near = neighbours[row](measure) if literal and isinstance(measure, Fix) and measure.has_height else None
-        groups.setdefault(_group(measure, near), []).append((row, base, measure, near))
+        groups.setdefault(_group(measure, near), []).append((row, base, measure, believed(base, measure), near))
     for (kind, radar), members in groups.items():
-        rows, before, chosen, seen = zip(*members, strict=True)
+        rows, before, chosen, taken, seen = zip(*members, strict=True)
         elapsed_s = np.array([(measure.at - base.at) / SECOND for base, measure in zip(before, chosen, strict=True)])
         memory = stacked([base.memory for base in before])
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):  # what comes of it is begun anew
-            after = estimator.advance(before, Group(kind, radar, chosen, seen, elapsed_s, memory))
+            after = estimator.advance(before, Group(kind, radar, taken, seen, elapsed_s, memory))
         all_sound = is_sound(after.state)
         states = zip(after.state.mean, after.state.covariance, after.memory, after.beliefs, strict=True)
         residuals = [None] * len(before) if after.residual is None else list(zip(*after.residual, strict=True))
@@ -102,10 +113,13 @@ def _begun_again(event: Event, estimator: Estimator) -> Event:
     """The same track from its newest measurement alone, if it is lost and that gives a place."""
     if not can_begin(event.measure):
         return event
-    first, belief = estimator.begin(event.measure)
+    first, belief = estimator.begin(believed(event, event.measure))
     reason = why(event, first)
     if reason is None:
         return event
+    if lost_again(event):
+        first, belief = estimator.begin(without_velocity(event.measure))
+        reason = f"{reason}, soon after it started again before: velocities of reports are left out until they fit it"
     has_height = event.height_at == event.at
     return replace(
         event,
@@ -117,6 +131,8 @@ def _begun_again(event: Event, estimator: Estimator) -> Event:
         far_off=0,
         far_since=NEVER,
         restarted=reason,
+        restarted_at=event.at,
+        doubts=DOUBTS if lost_again(event) else event.doubts,
         residual=None,
         latest={},
     )
@@ -158,6 +174,9 @@ def _event(
     # The longest recent interval, forgotten slowly: tells a source of one report each 5 s from one that fell silent.
     interval = max(measure.at - base.at, base.interval - base.interval // 8) if base else 0
     source, latest, told = measure.radar if isinstance(measure, Plot) else 0, base.latest if base else {}, None
+    restarted_at, doubts = (base.restarted_at, base.doubts) if base else (NEVER, 0)
+    if doubts:
+        doubts = doubts_after(doubts, measure, mean, covariance)
     if residual is not None:
         told = Residual.after(latest.get(source), *residual)
         latest = {**latest, source: told}
@@ -176,6 +195,8 @@ def _event(
         belief,
         far_off,
         far_since,
+        restarted_at=restarted_at,
+        doubts=doubts,
         score=score,
         residual=told,
         latest=latest,

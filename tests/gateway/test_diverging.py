@@ -139,3 +139,50 @@ def _broken(event: Event, value: float) -> dict[str, Any]:
         belief[7:13] *= value  # the six terms
         return {**wrong, "belief": belief}
     return wrong
+
+
+def _with_velocities(world: Any, seconds: float, velocity: Any, off: Any = lambda t: np.zeros(3)) -> list[Any]:
+    """Reports of 5 m, five a second, with velocities that a function makes of the true ones."""
+    random, course = np.random.default_rng(3), world.Course()
+    found = []
+    for k in range(int(5 * seconds)):
+        t = 0.2 * k
+        speed = velocity(t, world.frame.enu_from_runway @ course.velocity(t) + random.normal(0.0, 0.5, 3))
+        place, sigma = random.normal(0.0, 5.0, 3) + off(t), np.full(3, 5.0)
+        found.append(world.fix(course, t, serial=k, off_m=place, velocity_mps=speed, sigma_m=sigma))
+    return found
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("wrong", [100.0, -1.0, 0.0])
+def test_velocities_that_are_not_those_of_the_positions_are_left_out(
+    world: Any, estimator: EstimatorName, wrong: float
+) -> None:
+    """Of another unit, another sign, or none: the filter begins anew twice, says so, and follows the positions."""
+    events = _worked(world, _with_velocities(world, 30.0, lambda t, v: wrong * v), estimator)
+    said = [event.restarted for event in events if event.restarted]
+    assert len(said) == 2
+    assert "velocities" not in said[0]
+    assert said[1].endswith("velocities of reports are left out until they fit it")
+    course = world.Course()
+    for event in events[-50:]:
+        true = world.frame.enu_from_runway @ course.at((event.at - world.START) / world.SECOND)
+        assert np.linalg.norm(event.mean[POSITION] - true) < 20.0
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_velocities_that_fit_again_are_believed_again(world: Any, estimator: EstimatorName) -> None:
+    """After ten that fit, once the filter knows the velocity by itself."""
+    events = _worked(world, _with_velocities(world, 40.0, lambda t, v: v * (-1.0 if t < 15.0 else 1.0)), estimator)
+    doubted = [event.doubts > 0 for event in events]
+    assert doubted[74]
+    assert not any(doubted[-25:])
+    assert sum(event.restarted is not None for event in events) == 2
+
+
+def test_a_filter_that_is_lost_once_in_a_while_keeps_its_velocities(world: Any) -> None:
+    """Places that jump and jump back 12 s later: two new beginnings, and nothing is doubted."""
+    jumps = _with_velocities(world, 40.0, lambda t, v: v, lambda t: JUMP_M * (15.0 < t < 27.0))
+    events = _worked(world, jumps, "kalman")
+    assert sum(event.restarted is not None for event in events) == 2
+    assert not any(event.doubts for event in events)
