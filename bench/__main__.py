@@ -19,6 +19,7 @@ from bench.live_fleet import live_fleet
 from bench.live_rates import live_rates
 from bench.lively import core_share, lateness
 from bench.measure import Figure, load, machine
+from bench.registration import registration
 from bench.replays import help_text, ten_hours, ten_minutes
 from bench.throughput import throughput
 from bench.wires import wires
@@ -44,6 +45,7 @@ class Part(StrEnum):
     wires = "wires"
     estimation = "estimation"
     clutter = "clutter"
+    registration = "registration"
     fleet = "fleet"
     memory = "memory"
     hours = "hours"
@@ -106,6 +108,9 @@ def _measure(wanted: set[Part], runs: int, seconds: float, traffic_hours: int, c
         if Part.clutter in wanted:
             say("targets in clutter: ours and Stone Soup's trackers")
             figures += clutter(runs, say)
+        if Part.registration in wanted:
+            say("10 000 pairs of registration, and 1000 a second")
+            figures += registration(min(runs, 5))
         if Part.fleet in wanted:
             say("100 vehicles with two radars, and 1000 aircraft, live")
             figures += live_fleet(RATES_S)

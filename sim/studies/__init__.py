@@ -15,6 +15,7 @@ STUDIES = (
     "noise",
     "tuning",
     "registration",
+    "live-registration",
     "clutter",
     "reconstruction",
     "dead-reckoning",

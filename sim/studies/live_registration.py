@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters import Arrival, Source
+from adapters import Arrival, Kind, Source
 from gateway.align import SECOND
 from gateway.frames import RunwayFrame
 from gateway.picture import Picture
@@ -153,7 +153,7 @@ def pictures(scene: Scene, use: Registering) -> Iterator[Picture]:
     session = Run(Setup(Place(site, "", "the scene"), Options(registration=use), is_watched=False), scene.start_ns)
     numbers = {name: number for number, name in enumerate(scene.links, 1)}
     for name, number in numbers.items():
-        kind = "radar" if name.startswith("radar") else "mavlink"
+        kind: Kind = "radar" if name.startswith("radar") else "mavlink"
         session.add(Source(number, kind, name.replace(":", "-"), "the scene"))
     waiting, until = list[Arrival](), scene.start_ns + SECOND
     for event in events(scene):
