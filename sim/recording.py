@@ -36,7 +36,13 @@ def write_session(
     """
     folder = make_folder(parent, session_name(scene.start_ns, scene.name))
     record = Record(
-        __version__, command, Options(), scene.start_ns, format_site(scene.site), f"scene {scene.name}", ended="done"
+        __version__,
+        command,
+        Options(),
+        scene.start_ns,
+        format_site(scene.stated_site),
+        f"scene {scene.name}",
+        ended="done",
     )
     recorder = Recorder(folder, record)
     numbers = {name: number for number, name in enumerate(scene.links, 1)}

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gateway.settings import RadarSite, Site
+from gateway.settings import PositionSource, RadarSite, Site
 from sim.earth import Flown, fly
 from sim.paths import Path
 from sim.sensors import GpsParameters, RadarParameters
@@ -15,6 +15,7 @@ from sim.sensors import GpsParameters, RadarParameters
 Floats = NDArray[np.float64]
 
 STAMP_STEP_NS = 4_000  # stamps are multiples of 4 us, so that the low two bits of a tlog's microseconds are 0
+LEAST_STATED = 0.1  # m, m/s: what is simulated without noise still has to be weighed
 LARGEST_SYSTEM = 250  # system ids above belong to ground stations
 
 
@@ -74,6 +75,19 @@ class Scene:
     gps: GpsParameters
     radars: tuple[SceneRadar, ...]
     say: SayParameters = SayParameters()
+
+    @property
+    def stated_site(self) -> Site:
+        """The site as somebody states it who knows what its position sources are worth, unless it states that itself."""
+        if self.site.position != PositionSource():
+            return self.site
+        gps = self.gps
+        worth = replace(
+            self.site.position,
+            sigma_m=max(gps.sigma_m, LEAST_STATED),
+            velocity_sigma_mps=max(gps.velocity_sigma_mps, LEAST_STATED),
+        )
+        return replace(self.site, position=worth)
 
     def present(self, aircraft: Aircraft) -> tuple[float, float]:
         """From when until before when an aircraft is in the scene, s; the same twice if never."""

@@ -21,7 +21,7 @@ class SimulatedWorld:
         self._name, self._seed = scene, seed
         self._second = from_s
         self._failure: BaseException | None = None
-        self.site: Site = build_scene(scene, start_ns=0, seed=seed).site
+        self.site: Site = build_scene(scene, start_ns=0, seed=seed).stated_site
 
     def fraction(self) -> float:
         """How much of it has been played, from 0 to 1."""

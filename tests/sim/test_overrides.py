@@ -1,10 +1,11 @@
 """Changes to a scene, as people write them, and what they are told when one cannot be made."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
-from gateway.settings import DEMO_SITE, parse_site
+from gateway.settings import DEMO_SITE, PositionSource, parse_site
 from sim.overrides import OverrideError, SceneParameters, override
 from sim.scenes import SCENES, build_scene
 
@@ -159,3 +160,13 @@ def test_every_scene_says_what_it_is() -> None:
     """Each scene has a sentence for the list of scenes, and "radar" is none of them."""
     assert all(kind.says for kind in SCENES.values())
     assert "radar" not in SCENES
+
+
+def test_the_site_that_goes_with_a_scene_states_what_is_simulated() -> None:
+    """Noise of position and velocity as simulated, never nothing; a site that states them itself is left as it is."""
+    stated = build_scene("traffic", start_ns=0).stated_site.position
+    assert (stated.sigma_m, stated.velocity_sigma_mps) == (8.0, 0.5)
+    silent = build_scene("approach", start_ns=0, changes=["gps.sigma_m=0", "gps.velocity_sigma_mps=0"]).stated_site
+    assert min(silent.position.sigma_m, silent.position.velocity_sigma_mps) > 0.0
+    own = replace(DEMO_SITE, position=PositionSource(3.0, 10.0, 2.0))
+    assert build_scene("traffic", start_ns=0, site=own).stated_site.position == own.position
