@@ -18,14 +18,13 @@ from adapters.air import (
     STRONGEST_MPS,
     shown_wind,
 )
-from adapters.columns import payload_dtype
 from adapters.rows import Floats, Integers, Rows, Truths
 from gateway.observation import AirData, Many
 
 
-def hud(rows: Rows, payloads: Sequence[tuple[int, bytes]]) -> Many:
+def hud(rows: Rows, fields: Sequence[tuple[int, NDArray[Any]]]) -> Many:
     """VFR_HUD."""
-    told = _fields(payloads)
+    ((_, told),) = fields
     columns = {
         "airspeed_mps": rows.within(told["airspeed"], 0.0, FASTEST_MPS),
         "groundspeed_mps": rows.within(told["groundspeed"], 0.0, FASTEST_MPS),
@@ -39,9 +38,9 @@ def hud(rows: Rows, payloads: Sequence[tuple[int, bytes]]) -> Many:
     return rows.many(AirData, says, rows.at_receipt(), **columns)
 
 
-def pressure(rows: Rows, payloads: Sequence[tuple[int, bytes]]) -> Many:
+def pressure(rows: Rows, fields: Sequence[tuple[int, NDArray[Any]]]) -> Many:
     """SCALED_PRESSURE."""
-    told = _fields(payloads)
+    ((_, told),) = fields
     static = rows.within(told["press_abs"], 1e-3, GREATEST_HPA)
     pitot = rows.within(told["press_diff"], -GREATEST_HPA, GREATEST_HPA)
     centidegrees = told["temperature"].astype(np.float64)
@@ -58,9 +57,9 @@ def pressure(rows: Rows, payloads: Sequence[tuple[int, bytes]]) -> Many:
     )
 
 
-def wind(rows: Rows, payloads: Sequence[tuple[int, bytes]]) -> Many:
+def wind(rows: Rows, fields: Sequence[tuple[int, NDArray[Any]]]) -> Many:
     """WIND."""
-    told = _fields(payloads)
+    ((_, told),) = fields
     strength = rows.within(told["speed"], 0.0, STRONGEST_MPS)
     bearing = rows.within(told["direction"], -360.0, 360.0)
     down = rows.within(told["speed_z"], -STRONGEST_MPS, STRONGEST_MPS)
@@ -72,9 +71,9 @@ def wind(rows: Rows, payloads: Sequence[tuple[int, bytes]]) -> Many:
     return _wind(rows, says, rows.at_receipt(), east, north, down)
 
 
-def wind_components(rows: Rows, payloads: Sequence[tuple[int, bytes]]) -> Many:
+def wind_components(rows: Rows, fields: Sequence[tuple[int, NDArray[Any]]]) -> Many:
     """WIND_COV."""
-    told = _fields(payloads)
+    ((_, told),) = fields
     known = ~(np.isnan(told["wind_x"]) | np.isnan(told["wind_y"]))
     rows, told = rows[known], told[known]
     north = rows.within(told["wind_x"], -STRONGEST_MPS, STRONGEST_MPS)
@@ -92,9 +91,3 @@ def _wind(rows: Rows, says: Truths, valid_at: Integers, east: Floats, north: Flo
         readings = rows.vehicles[vehicle].readings
         rows.shown.extend((int(rows.places[row]), readings, name, value) for name, value in shown.items())
     return rows.many(AirData, says, valid_at, wind_east_mps=east, wind_north_mps=north, wind_up_mps=-down)
-
-
-def _fields(payloads: Sequence[tuple[int, bytes]]) -> NDArray[Any]:
-    """The fields of the payloads of the only message."""
-    ((message, block),) = payloads
-    return np.frombuffer(block, payload_dtype(message))

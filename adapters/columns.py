@@ -87,6 +87,21 @@ def message_dtype(number: int) -> np.dtype[Any]:
 
 
 @cache
+def datagram_dtype(number: int) -> np.dtype[Any]:
+    """A whole unsigned MAVLink 2 frame of a message id, none of whose zeros are cut, with the fields of its payload."""
+    payload = payload_dtype(number)
+    fields: Mapping[str, Any] = payload.fields or {}
+    return np.dtype(
+        {
+            "names": list(fields),
+            "formats": [one[0] for one in fields.values()],
+            "offsets": [10 + one[1] for one in fields.values()],
+            "itemsize": payload.itemsize + 12,
+        }
+    )
+
+
+@cache
 def payload_dtype(number: int) -> np.dtype[Any]:
     """The whole payload of a message id, its fields in their declared order. Arrays are subarrays, texts bytes.
 

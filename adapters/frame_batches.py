@@ -54,7 +54,7 @@ def heads_of(datagrams: Sequence[bytes]) -> Heads:
     head = np.ndarray(len(block) - 11, "<i8", block, strides=(1,))[start + 4] & _SIX_BYTES
     told = np.ndarray(len(block) - 1, "<u2", block, strides=(1,))[end - 2]
     plain = (first & 0xFF00FF == V2) & (sizes == (first >> 8 & 255).astype(np.int64) + 12)
-    state = np.array(list(map(mcrf4xx, datagrams, repeat(_INITIAL))), np.uint16)
+    state = np.fromiter(map(mcrf4xx, datagrams, repeat(_INITIAL)), np.uint16, count)
     crc, extra = _BEFORE_TWO[state] ^ told, EXTRAS[np.minimum(head >> 24, len(EXTRAS) - 1)]
     is_good = plain & (extra >= 0) & (ONE_BYTE[(crc ^ extra) & 255] ^ crc >> 8 == told)
     return np.where(is_good, head, NO_HEAD)

@@ -38,7 +38,9 @@ class Gathered:
 
     def add(self, place: int, number: int, received_at: int, found: Sequence[Observation]) -> None:
         """What an arrival of a source said that no stage reads."""
-        self.add_all(place, received_at, found, {number: len(found)})
+        self._place, self._received_at = place, received_at
+        self._observations += found
+        self._counts[number] += len(found)
 
     def add_all(self, place: int, received_at: int, found: Sequence[Observation], counts: Mapping[int, int]) -> None:
         """What several said, the last of which was at this place; `counts`: how much by source."""

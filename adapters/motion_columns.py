@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.columns import payload_dtype
+from adapters.columns import datagram_dtype
 from adapters.moments import LEAST_UNIX_USEC
 from adapters.motion import (
     AXES,
@@ -29,24 +29,18 @@ _FIELDS = ("acceleration_mps2", "angular_rate_radps", "magnetic_field_gauss")
 
 
 @cache
-def axes_dtype(message: int) -> np.dtype[Any]:
-    """The payload of a message with its nine axes in one array, its time and its sensor's number, as far as it has them."""
-    whole: Mapping[str, Any] = payload_dtype(message).fields or {}
-    assert [whole[name][1] - whole[AXES[0]][1] for name in AXES] == list(range(0, 18, 2))
-    named = {name: whole[name] for name in ("time_usec", "time_boot_ms", "id") if name in whole}
-    return np.dtype(
-        {
-            "names": ["axes", *named],
-            "formats": [("<i2", (9,)), *(one[0] for one in named.values())],
-            "offsets": [whole[AXES[0]][1], *(one[1] for one in named.values())],
-            "itemsize": payload_dtype(message).itemsize,
-        }
-    )
+def _axes_dtype(message: int) -> np.dtype[Any]:
+    """A whole frame of a message with its nine axes in one array."""
+    whole = datagram_dtype(message)
+    fields: Mapping[str, Any] = whole.fields or {}
+    first = int(fields[AXES[0]][1])
+    assert [int(fields[name][1]) - first for name in AXES] == list(range(0, 18, 2))
+    return np.dtype({"names": ["axes"], "formats": [("<i2", (9,))], "offsets": [first], "itemsize": whole.itemsize})
 
 
-def scaled_imu(rows: Rows, payloads: Sequence[tuple[int, bytes]]) -> Many:
+def scaled_imu(rows: Rows, told: Sequence[tuple[int, NDArray[Any]]]) -> Many:
     """RAW_IMU, SCALED_IMU, SCALED_IMU2, SCALED_IMU3: samples in mG, mrad/s and mgauss."""
-    axes, usec, sensor, in_milli_g = map(np.concatenate, zip(*(_told(*one) for one in payloads), strict=True))
+    axes, usec, sensor, in_milli_g = map(np.concatenate, zip(*(_told(*one) for one in told), strict=True))
     known = in_milli_g | np.array([one == ARDUPILOT for one in rows.autopilots])[rows.vehicle]
     if not known.all():
         rows.count("raw units unknown", ~known)
@@ -59,23 +53,23 @@ def scaled_imu(rows: Rows, payloads: Sequence[tuple[int, bytes]]) -> Many:
     rows.count("inertial out of range", np.logical_or.reduce(cut, axis=1))
     nothing = np.logical_and.reduce(vectors == 0.0, axis=2)
     nothing[:, 1] &= nothing[:, 0]  # nothing turns beside what is accelerated
-    told = ~cut & ~nothing
-    says = np.logical_or.reduce(told, axis=1)
+    has = ~cut & ~nothing
+    says = np.logical_or.reduce(has, axis=1)
     rows.count("inertial unit without data", ~says)
-    vectors[~told] = np.nan
-    _show(rows, sensor, vectors, told)
+    vectors[~has] = np.nan
+    _show(rows, sensor, vectors, has)
     columns = {name: vectors[:, place] for place, name in enumerate(_FIELDS)}
     return rows.many(ImuSample, says, rows.near(usec), sensor=sensor, **columns)
 
 
-def _told(message: int, block: bytes) -> tuple[NDArray[np.int16], Integers, Integers, Truths]:
-    """Axes, time, sensor of the payloads of one message, and whether they are surely in mG."""
-    told = np.frombuffer(block, axes_dtype(message))
+def _told(message: int, told: NDArray[Any]) -> tuple[NDArray[np.int16], Integers, Integers, Truths]:
+    """Axes, time, sensor of frames of one message, and whether they are surely in mG."""
+    axes = told.view(_axes_dtype(message))["axes"]
     if message == RAW_IMU:
         usec = np.minimum(told["time_usec"], LEAST_UNIX_USEC).astype(np.int64)
-        return told["axes"], usec, told["id"].astype(np.int64) + 1, np.zeros(len(told), np.bool_)
+        return axes, usec, told["id"].astype(np.int64) + 1, np.zeros(len(told), np.bool_)
     sensor = np.full(len(told), _SENSORS[message])
-    return told["axes"], told["time_boot_ms"].astype(np.int64) * 1000, sensor, np.ones(len(told), np.bool_)
+    return axes, told["time_boot_ms"].astype(np.int64) * 1000, sensor, np.ones(len(told), np.bool_)
 
 
 def _show(rows: Rows, sensor: NDArray[np.int64], vectors: Floats, told: Truths) -> None:

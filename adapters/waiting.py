@@ -10,13 +10,14 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
 from operator import itemgetter
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adapters import air, air_columns, motion, motion_columns
 from adapters.arrivals import Arrivals, Integers, are_first
-from adapters.columns import payload_dtype
+from adapters.columns import datagram_dtype
 from adapters.epoch import SessionEpoch
 from adapters.frame_batches import Heads, places_of, wanted
 from adapters.framing import EXTRAS
@@ -27,8 +28,8 @@ from adapters.vehicle import Vehicle
 from adapters.vehicles import Component
 from gateway.observation import Many
 
-Reader = Callable[[Rows, Sequence[tuple[int, bytes]]], Many]
-"""What rows say, whose payloads stand end to end, message after message."""
+Reader = Callable[[Rows, Sequence[tuple[int, NDArray[Any]]]], Many]
+"""What rows say; their fields come message after message, each with its id."""
 
 _FAMILIES: Sequence[tuple[Reader, tuple[int, ...]]] = (
     (motion_columns.scaled_imu, (motion.RAW_IMU, motion.SCALED_IMU, motion.SCALED_IMU2, motion.SCALED_IMU3)),
@@ -129,8 +130,8 @@ class Waiting:
         bounds = list(zip(kinds[begins].tolist(), begins, [*begins[1:], len(kinds)], strict=True))
         for reader, of_family in groupby(bounds, lambda one: _READ[one[0]][0]):
             parts = list(of_family)
-            payloads = [self._payloads(_READ[kind][1], places[begin:end]) for kind, begin, end in parts]
-            one = reader(rows[parts[0][1] : parts[-1][2]], payloads)
+            told = [(message := _READ[kind][1], self._fields(message, places[begin:end])) for kind, begin, end in parts]
+            one = reader(rows[parts[0][1] : parts[-1][2]], told)
             if len(one):
                 found.append(one)
         shown.sort(key=itemgetter(0))
@@ -159,6 +160,11 @@ class Waiting:
             said,
         )
 
-    def _payloads(self, message: int, places: Integers) -> tuple[int, bytes]:
-        size, data = payload_dtype(message).itemsize, self._arrivals.data
-        return message, b"".join([data[place][10:-2].ljust(size, b"\0")[:size] for place in places.tolist()])
+    def _fields(self, message: int, places: Integers) -> NDArray[Any]:
+        """The fields of frames of one message, of whatever length they were sent."""
+        dtype = datagram_dtype(message)
+        data = [self._arrivals.data[place] for place in places.tolist()]
+        if set(map(len, data)) != {dtype.itemsize}:
+            whole = dtype.itemsize - 2
+            data = [one[:-2].ljust(whole, b"\0")[:whole] + b"\0\0" for one in data]
+        return np.frombuffer(b"".join(data), dtype)
