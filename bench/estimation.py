@@ -1,9 +1,9 @@
-"""An IMM of two models, straight and turning, in the plane: ours, a textbook's loop and other libraries', turn by turn.
+"""An IMM: the gateway's own, a textbook's loop and other libraries', turn by turn.
 
 python -m bench.estimation RUNS       prints, as JSON, track-steps per CPU second of every side, and how they agree
 
-Four states (east, north and their rates), a position each second; the same data, matrices and first states on every side,
-and all combined states after every report. What is not installed is left out and said.
+The gateway's five modes of eleven states, a report each second; the same data, matrices and first states on every side, and
+all combined states after every report. What is not installed is left out and said.
 """
 
 from __future__ import annotations

@@ -10,38 +10,37 @@ from typing import Any
 
 import numpy as np
 
-from bench.estimation_sides import PEERS, Problem, Run, ours, textbook
+from bench.estimation_sides import ERROR_M, PEERS, Problem, Run, gateway_modes, ours, textbook
+from gateway.estimators.kalman import Estimate
+from gateway.estimators.modes import begin, moved
 
+CALM, LEFT = 0, 3  # places of the modes that are flown
 ONE_STEPS, MANY, MANY_STEPS = 300, 1000, 3
+SIGMA_M = 25.0
 LEAST_S = 0.2  # of a measurement: what is faster runs again and again
-TURN_RPS, SIGMA_M, CALM, HARD = math.radians(3.0), 25.0, 0.1, 0.6
 
 
 def problem(tracks: int, steps: int) -> Problem:
-    """Aircraft of 40 to 130 m/s that fly straight, and turn left in the second half."""
-    random = np.random.default_rng(1)
-    half = math.sin(TURN_RPS) / TURN_RPS, (1.0 - math.cos(TURN_RPS)) / TURN_RPS
-    straight, turning = np.eye(4), np.eye(4)
-    straight[0, 2] = straight[1, 3] = 1.0
-    turning[0, 2] = turning[1, 3] = half[0]
-    turning[1, 2], turning[0, 3] = half[1], -half[1]
-    turning[2:, 2:] = [[math.cos(TURN_RPS), -math.sin(TURN_RPS)], [math.sin(TURN_RPS), math.cos(TURN_RPS)]]
-    grown = np.kron([[1 / 3, 1 / 2], [1 / 2, 1.0]], np.eye(2))
+    """Aircraft of 40 to 130 m/s that fly straight, and turn left in the second half, reported with an error that drifts.
+
+    The gateway's five modes of eleven states: position, velocity, the source's own error, and a level acceleration that lasts in
+    one of the modes. The reports measure position and error together.
+    """
+    random, modes = np.random.default_rng(1), gateway_modes()
     speed, course = random.uniform(40.0, 130.0, tracks), random.uniform(0.0, 2.0 * math.pi, tracks)
-    mean = np.stack([*random.normal(0.0, 3e4, (2, tracks)), speed * np.cos(course), speed * np.sin(course)], axis=1)
+    mean = np.zeros((tracks, 9))
+    mean[:, :3] = random.normal(0.0, 3e4, (tracks, 3))
+    mean[:, 3:5] = np.stack([speed * np.cos(course), speed * np.sin(course)], axis=1)
+    covariance = np.diag([SIGMA_M**2] * 3 + [100.0] * 3 + [ERROR_M**2] * 3)
+    first = begin(Estimate(mean, np.repeat(covariance[None], tracks, axis=0)), modes)
+    carry, noise = (part[0] for part in moved(first.mean[:1], first.weight[:1], np.ones(1), modes))
     true, measured = mean, []
     for step in range(steps):
-        true = true @ (turning if 2 * step >= steps else straight).T
-        measured.append(true[:, :2] + random.normal(0.0, SIGMA_M, (tracks, 2)))
+        true = true @ carry[LEFT if 2 * step >= steps else CALM][:9, :9].T
+        measured.append(true[:, :3] + random.normal(0.0, SIGMA_M, (tracks, 3)))
+    chance = modes.transition(np.ones(1))[0]
     return Problem(
-        np.array([straight, turning]),
-        np.array([CALM * grown, HARD * grown]),
-        np.array([[0.95, 0.05], [0.1, 0.9]]),
-        np.array([0.7, 0.3]),
-        SIGMA_M**2,
-        mean,
-        np.diag([SIGMA_M**2, SIGMA_M**2, 100.0, 100.0]),
-        np.array(measured),
+        carry, noise, chance, modes.shares, SIGMA_M**2, first.mean[:, 0], first.covariance[0, 0], np.array(measured)
     )
 
 

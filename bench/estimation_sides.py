@@ -9,15 +9,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.estimators.holding import Held
+from gateway.estimators.kalman import Estimate, Motion
+from gateway.estimators.modes import Modes, begin, combine, predict, update
+from gateway.fuse.flying import modes_of
+from gateway.settings import Estimation, Options
+
 Floats = NDArray[np.float64]
 States = tuple[Floats, Floats]
 Run = Callable[[], States]
+
+ERROR_M = 20.0  # of the position source, on each axis
+ALIKE_MPS2 = 0.5  # the acceleration that lasts, on each axis
 
 
 @dataclass(frozen=True)
@@ -40,36 +49,35 @@ class Problem:
 
     @property
     def sensitivity(self) -> Floats:
-        """(k, d)."""
-        return np.eye(self.measured.shape[2], self.mean.shape[1])
+        """(k, d): position and the source's error together."""
+        return np.concatenate([np.eye(3), np.zeros((3, 3)), np.eye(3), np.zeros((3, self.mean.shape[1] - 9))], axis=1)
+
+
+def gateway_modes() -> Modes:
+    """The gateway's default modes with matrices that are the same for all tracks: one turn rate, noise alike along and across."""
+    modes = modes_of(Options(estimator="imm"), Motion((1.0,) * 3, ERROR_M), Estimation())
+    assert modes is not None
+    alike = tuple(replace(mode, along=1.0) for mode in modes.modes)
+    held = Held(ALIKE_MPS2, ALIKE_MPS2, Estimation().lasting_for_s)
+    return replace(modes, modes=alike, bank_rad=0.0, acceleration=held)
 
 
 def ours(problem: Problem) -> Run:
-    """All tracks in one batch."""
-    from gateway.estimators.interaction import Models, combined, corrected, mixed, moved
-
-    n, d = problem.mean.shape
-    m, k = len(problem.share), problem.measured.shape[2]
-    change, noise = (
-        (problem.carry - np.eye(d)).transpose(1, 2, 0)[..., None],
-        problem.noise.transpose(1, 2, 0)[..., None],
-    )
-    touched = [np.flatnonzero((change[:, column] != 0.0).any(axis=(1, 2))) for column in range(d)]
-    columns = [(column, int(rows[0]), int(rows[-1]) + 1) for column, rows in enumerate(touched) if len(rows)]
-    chance, variance, seen = problem.chance[:, :, None], np.full((k, 1), problem.variance), slice(0, k)
-    measured = np.ascontiguousarray(problem.measured.transpose(0, 2, 1))
-    first = Models(
-        np.repeat(problem.share[:, None], n, axis=1),
-        np.repeat(problem.mean.T[:, None], m, axis=1),
-        np.repeat(np.repeat(problem.covariance[:, :, None], m, axis=2)[..., None], n, axis=3),
-    )
+    """The gateway's own filter, all tracks in one batch."""
+    modes, n = gateway_modes(), len(problem.mean)
+    first = begin(Estimate(problem.mean[:, :9], np.repeat(problem.covariance[None, :9, :9], n, axis=0)), modes)
+    seen = problem.sensitivity
+    reports = np.repeat(problem.measured, modes.count, axis=1)
+    variance, second = np.full(reports.shape[1:], problem.variance), np.ones(n)
 
     def run() -> States:
-        models = first
-        for report in measured:
-            models = corrected(moved(mixed(models, chance), change, noise, columns), report, variance, seen)
-            mean, covariance = combined(models)
-        return mean.T, covariance.transpose(2, 0, 1)
+        mixture = first
+        for report in reports:
+            mixture = predict(mixture, second, modes)
+            off = report - (seen @ mixture.each().mean[:, :, None])[:, :, 0]
+            mixture, _ = update(mixture, off, seen[None], variance, modes)
+            state = combine(mixture)
+        return state.mean, state.covariance
 
     return run
 
@@ -229,6 +237,8 @@ def _each(problem: Problem, made: Callable[[int], Any], one: Callable[[int, Any]
 
 
 def _gathered(states: list[States]) -> States:
+    """Of the nine states that everybody tells."""
+    states = [(mean[:9], covariance[:9, :9]) for mean, covariance in states]
     return np.array([mean for mean, _ in states]), np.array([covariance for _, covariance in states])
 
 

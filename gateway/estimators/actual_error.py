@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators.kalman import ERROR, Innovation
+from gateway.estimators.matching import matched
 
 Floats = NDArray[np.float64]
 
@@ -24,27 +25,36 @@ MOST = 2.0  # times what the filter reckons with: beyond it something else has b
 
 def carried_on(error: Floats, weight: Floats, carry: Floats, noise: Floats, share: float = MANOEUVRE_SHARE) -> Floats:
     """Error covariances (n, d, d) later: transition and noise (n, m, d, d) of the modes, by their weights (n, m)."""
-    by_mode = weight[:, :, None, None]
-    moved: Floats = (by_mode * carry).sum(axis=1)
-    grown: Floats = (by_mode * noise).sum(axis=1)
+    moved, grown = _whole(weight, carry), _whole(weight, noise)
     told = share * grown
     told[:, ERROR, ERROR] = grown[:, ERROR, ERROR]
     return np.asarray(moved @ error @ moved.transpose(0, 2, 1) + told)
 
 
-def corrected(error: Floats, weight: Floats, told: Innovation, reckoned: Floats) -> Floats:
-    """Error covariances (n, d, d) after an update of n m rows, by the modes' weights (n, m) after it.
+def corrected(error: Floats, weight: Floats, told: Innovation, mean: Floats, covariance: Floats) -> Floats:
+    """Error covariances (n, d, d) after an update of n m rows, by the modes' weights (n, m), means and covariances after it.
 
-    Never more than twice what the filter reckons with, (n, d, d): a guessed height, for one, bounds that without a gain.
+    Means are (n, m, d), covariances (n, m, d, d). Never more than twice what the filter reckons with: a guessed height, for
+    one, bounds that without a gain.
     """
-    n, m = weight.shape
-    size = error.shape[-1]
-    axes = np.arange(size)
-    gain = (weight[:, :, None, None] * told.gain.reshape(n, m, size, -1)).sum(axis=1)
+    n, m, size = mean.shape
+    gain = _whole(weight, told.gain.reshape(n, m, size, -1))
     first = np.broadcast_to(told.sensitivity, (n * m, *told.sensitivity.shape[1:]))[::m]
     kept = np.eye(size) - gain @ first
     noise = (gain * told.noise[::m, None, :]) @ gain.transpose(0, 2, 1)
-    after = kept @ error @ kept.transpose(0, 2, 1) + noise
+    after: Floats = kept @ error @ kept.transpose(0, 2, 1) + noise
     after = 0.5 * (after + after.transpose(0, 2, 1))
-    out = (after[:, axes, axes] > MOST * reckoned[:, axes, axes]).any(axis=1)
-    return np.where(out[:, None, None], reckoned, after)
+    by_mode, axes = weight[:, None, :], np.arange(size)
+    off = mean - by_mode @ mean
+    reckoned = (by_mode @ (covariance[:, :, axes, axes] + off * off))[:, 0]
+    out = (after[:, axes, axes] > MOST * reckoned).any(axis=1)
+    if out.any():
+        _, whole = matched(weight[out, :, None], mean[out], covariance[out])
+        after[out] = whole[:, 0]
+    return after
+
+
+def _whole(weight: Floats, parts: Floats) -> Floats:
+    """Matrices (n, m, a, b) of the modes as one, (n, a, b), by their weights (n, m)."""
+    n, m, *shape = parts.shape
+    return np.asarray((weight[:, None, :] @ parts.reshape(n, m, -1)).reshape(n, *shape))

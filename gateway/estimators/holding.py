@@ -19,6 +19,7 @@ from gateway.estimators.kalman import SIZE
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
 
 WIDE = SIZE + 2
 LONG = 1.0  # time constants: beyond it the closed form keeps its digits, below it eight points integrate exactly
@@ -37,40 +38,32 @@ class Held:
     lasts_s: float
 
 
-def along_the_course(noise: Floats, course: Floats, share: Floats) -> Floats:
-    """Noise (n, m, 9, 9) that is alike on both level axes, with a share (m,) of its sigma along courses (n, 2) of length 1.
+def turn_along(noise: Floats, course: Floats, share: Floats, uneven: Ints) -> None:
+    """Turn level noise (n, m, d, d), alike on both axes, along courses (n, 2) of length 1, for the straight modes `uneven`.
 
-    A course of 0, of an aircraft that stands, leaves it alike.
+    There a share (m,) of its sigma is left along the course. A course of 0, of what stands, leaves it alike.
     """
-    turned = _turned(course, share)
-    found = noise.copy()
+    turned = _turned(course, share[uneven])
     for place, rows in enumerate(_LEVEL[:2]):
         for columns in _LEVEL[: place + 1]:
-            block = noise[..., rows.start, columns.start, None, None] * turned
-            found[..., rows, columns] = found[..., columns, rows] = block
-    return found
+            block = noise[:, uneven, rows.start, columns.start, None, None] * turned
+            noise[:, uneven, rows, columns] = noise[:, uneven, columns, rows] = block
 
 
-def widened(
-    carry: Floats, noise: Floats, elapsed_s: Floats, course: Floats, held: Held, holds: Bools
-) -> tuple[Floats, Floats]:
-    """Transition and noise (n, m, 11, 11) from those of nine states over times (n,), for modes (m,) that hold or do not."""
-    n, m = carry.shape[:2]
-    wide, shaken = np.zeros((n, m, WIDE, WIDE)), np.zeros((n, m, WIDE, WIDE))
-    wide[..., :SIZE, :SIZE], shaken[..., :SIZE, :SIZE] = carry, noise
+def add_held(carry: Floats, noise: Floats, elapsed_s: Floats, course: Floats, held: Held, holds: Bools) -> None:
+    """Fill in what two states more do to transition and noise (n, m, 11, 11) over times (n,): modes (m,) hold, or do not."""
     place, speed, kept = _response(elapsed_s, held.lasts_s)
     for axis in (0, 1):
-        wide[:, holds, axis, SIZE + axis] = place[:, None]
-        wide[:, holds, 3 + axis, SIZE + axis] = speed[:, None]
-        wide[:, holds, SIZE + axis, SIZE + axis] = kept[:, None]
+        carry[:, holds, axis, SIZE + axis] = place[:, None]
+        carry[:, holds, 3 + axis, SIZE + axis] = speed[:, None]
+        carry[:, holds, SIZE + axis, SIZE + axis] = kept[:, None]
     sigma2 = held.across_mps2**2
     turned = _turned(course, np.array([held.along_mps2 / held.across_mps2]))
     grown = sigma2 * _grown(elapsed_s, held.lasts_s)
     for row, rows in enumerate(_LEVEL):
         for column, columns in enumerate(_LEVEL):
-            shaken[:, holds, rows, columns] += grown[:, row, column, None, None, None] * turned
-    shaken[:, ~holds, SIZE:, SIZE:] = sigma2 * turned
-    return wide, shaken
+            noise[:, holds, rows, columns] += grown[:, row, column, None, None, None] * turned
+    noise[:, ~holds, SIZE:, SIZE:] = sigma2 * turned
 
 
 def usual(course: Floats, held: Held) -> Floats:

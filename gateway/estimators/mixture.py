@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gateway.estimators.kalman import SIZE, Estimate
 from gateway.estimators.lagging import lag
+from gateway.estimators.matching import matched, spread
 
 Floats = NDArray[np.float64]
 
@@ -90,20 +91,3 @@ def stated(mixture: Mixture) -> Estimate:
     covariance = mixture.error + apart[:, 0]
     covariance = covariance + lag(mixture.whole_score, mixture.whole_information, covariance)
     return Estimate(mean[:, 0, :SIZE], covariance[:, :SIZE, :SIZE])
-
-
-def matched(share: Floats, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
-    """Means (n, j, d) and covariances (n, j, d, d) of the Gaussians that match m ones in shares (n, m, j)."""
-    middle, apart = spread(share, mean)
-    n, m, j = share.shape
-    size = mean.shape[-1]
-    within = share.transpose(0, 2, 1) @ covariance.reshape(n, m, size * size)
-    return middle, np.asarray(apart + within.reshape(n, j, size, size))
-
-
-def spread(share: Floats, mean: Floats) -> tuple[Floats, Floats]:
-    """Means (n, j, d) of m ones in shares (n, m, j), and how they lie about these, (n, j, d, d)."""
-    across = share.transpose(0, 2, 1)
-    middle = across @ mean
-    off = (mean[:, None] - middle[:, :, None]) * np.sqrt(across)[..., None]
-    return middle, off.swapaxes(-1, -2) @ off

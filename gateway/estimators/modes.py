@@ -20,7 +20,8 @@ residual of exactly 0 would throw out the mode that fits exactly; `literal` boun
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -28,13 +29,14 @@ from numpy.typing import NDArray
 
 from gateway.estimators import lagging
 from gateway.estimators.actual_error import carried_on, corrected
-from gateway.estimators.holding import WIDE, Held, along_the_course, usual, widened
+from gateway.estimators.holding import WIDE, Held, add_held, turn_along, usual
 from gateway.estimators.kalman import SIZE, Estimate, Innovation, Motion
 from gateway.estimators.kalman import update as update_each
+from gateway.estimators.matching import matched
 from gateway.estimators.mean_residual import excess, faded, in_metres, mean_size_m
 from gateway.estimators.mixed_innovation import Told
-from gateway.estimators.mixture import Mixture, combine, matched, stacked, stated
-from gateway.estimators.turning import carried
+from gateway.estimators.mixture import Mixture, combine, stacked, stated
+from gateway.estimators.turning import Shaken, carried
 
 __all__ = [
     "Mixture",
@@ -53,6 +55,7 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
 Rule = Literal["imm", "rmimm", "literal"]
 
 GRAVITY_MPS2 = 9.80665
@@ -78,6 +81,31 @@ class Mode:
 
 
 @dataclass(frozen=True, slots=True)
+class Numbers:
+    """A set of m modes as arrays (m,)."""
+
+    turn: Floats
+    share: Floats  # in all 1
+    along: Floats
+    uneven: Ints  # the places of modes whose noise is not alike along and across
+    holds: Bools
+    shaken: Shaken
+
+    @classmethod
+    def of(cls, modes: Sequence[Mode]) -> Numbers:
+        """The modes' own numbers."""
+        share, along = np.array([mode.share for mode in modes]), np.array([mode.along for mode in modes])
+        return cls(
+            np.array([mode.turn for mode in modes]),
+            share / share.sum(),
+            along,
+            np.flatnonzero(along != 1.0),
+            np.array([mode.holds for mode in modes]),
+            Shaken.of([mode.motion for mode in modes]),
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Modes:
     """A set of modes and how they follow each other.
 
@@ -92,6 +120,10 @@ class Modes:
     bank_rad: float = math.radians(30.0)
     fade: float = 0.92  # of the residuals' mean, over MEAN_PERIOD_S
     acceleration: Held | None = None  # that lasts in modes which hold it; with it there are two states more
+    numbers: Numbers = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "numbers", Numbers.of(self.modes))
 
     @property
     def count(self) -> int:
@@ -101,12 +133,11 @@ class Modes:
     def turn_rate(self, speed_mps: Floats) -> Floats:
         """Turn rate (n, m) in rad/s, positive to the left, of each mode at level speeds (n,)."""
         banked = GRAVITY_MPS2 * math.tan(self.bank_rad) / np.maximum(speed_mps, LEAST_SPEED_MPS)
-        turns = np.array([mode.turn for mode in self.modes])
-        return np.asarray(np.maximum(banked, self.turn_rate_rps)[:, None] * turns)
+        return np.asarray(np.maximum(banked, self.turn_rate_rps)[:, None] * self.numbers.turn)
 
     def directions(self, weight: Floats) -> Floats:
         """Probabilities (n, 3) of flying straight, turning left, turning right, from the modes' weights (n, m)."""
-        sides = np.sign([mode.turn for mode in self.modes])
+        sides = np.sign(self.numbers.turn)
         return np.stack([(weight * (sides == side)).sum(axis=1) for side in (0.0, 1.0, -1.0)], axis=1)
 
     def transition(self, elapsed_s: Floats) -> Floats:
@@ -121,8 +152,7 @@ class Modes:
     @property
     def shares(self) -> Floats:
         """How much of its time an aircraft spends in each mode, (m,), in all 1."""
-        shares = np.array([mode.share for mode in self.modes])
-        return np.asarray(shares / shares.sum())
+        return self.numbers.share
 
 
 def begin(state: Estimate, modes: Modes) -> Mixture:
@@ -179,18 +209,13 @@ def moved(mean: Floats, weight: Floats, elapsed_s: Floats, modes: Modes) -> tupl
     """Transition and noise (n, m, d, d) over times (n,) of modes that have mixed: means (n, m, d), weights (n, m)."""
     level = (weight[:, None, :] @ mean[:, :, 3:5])[:, 0]
     rate = modes.turn_rate(np.sqrt(level[:, 0] * level[:, 0] + level[:, 1] * level[:, 1]))
-    carry, noise = carried([mode.motion for mode in modes.modes], elapsed_s, rate)
-    along = np.array([mode.along for mode in modes.modes])
-    if modes.acceleration is None and (along == 1.0).all():
-        return carry, noise
-    course = _course(level)
-    uneven = np.flatnonzero(along != 1.0)
-    if len(uneven):
-        noise[:, uneven] = along_the_course(noise[:, uneven], course, along[uneven])
-    if modes.acceleration is None:
-        return carry, noise
-    holds = np.array([mode.holds for mode in modes.modes])
-    return widened(carry, noise, elapsed_s, course, modes.acceleration, holds)
+    numbers, held = modes.numbers, modes.acceleration
+    carry, noise = carried(numbers.shaken, elapsed_s, rate, SIZE if held is None else WIDE)
+    if len(numbers.uneven):
+        turn_along(noise, _course(level), numbers.along, numbers.uneven)
+    if held is not None:
+        add_held(carry, noise, elapsed_s, _course(level), held, numbers.holds)
+    return carry, noise
 
 
 def _course(level: Floats) -> Floats:
@@ -247,7 +272,6 @@ def weigh(mixture: Mixture, after: Estimate, told: Innovation, modes: Modes) -> 
     weight = np.maximum(weight / weight.sum(axis=1, keepdims=True), LEAST_WEIGHT)
     weight /= weight.sum(axis=1, keepdims=True)
     mean, covariance = after.mean.reshape(n, m, -1), after.covariance.reshape(mixture.covariance.shape)
-    _, reckoned = matched(weight[:, :, None], mean, covariance)
     whole = Told(mixture.weight, told, likelihood, mixture.error, mixture.unmixed)
     whole_score, whole_information = lagging.faded(
         mixture.whole_score,
@@ -257,7 +281,7 @@ def weigh(mixture: Mixture, after: Estimate, told: Innovation, modes: Modes) -> 
         whole.sensitivity,
         mixture.elapsed_s,
     )
-    error = corrected(mixture.error, weight, told, reckoned[:, 0])
+    error = corrected(mixture.error, weight, told, mean, covariance)
     mixture_after = Mixture(
         mean,
         covariance,

@@ -61,7 +61,7 @@ def test_one_mode_that_is_shaken_as_it_reckons_makes_the_error_that_it_reckons_w
         carry, noise = moved(before.mean, before.weight, elapsed_s, modes)
         error = actual_error.carried_on(error, mixture.weight, carry, noise, share=1.0)
         state, told = kalman.update(mixture.each(), np.ones((2, 3)), FIX, np.full((2, 3), 400.0))
-        error = actual_error.corrected(error, mixture.weight, told, state.covariance)
+        error = actual_error.corrected(error, mixture.weight, told, state.mean[:, None], state.covariance[:, None])
         mixture, _ = update(mixture, np.ones((2, 3)), FIX, np.full((2, 3), 400.0), modes)
         assert error == pytest.approx(mixture.covariance[:, 0], rel=1e-9, abs=1e-9)
 
@@ -73,5 +73,6 @@ def test_what_something_else_has_bounded_is_bounded_here_too() -> None:
     _, told = kalman.update(state, np.full((1, 3), math.nan), FIX, np.full((1, 3), 400.0))
     reckoned = state.covariance.copy()
     reckoned[:, 2, 2] = 100.0
-    error = actual_error.corrected(state.covariance, begin(state, modes).weight, told, reckoned)
+    weight = begin(state, modes).weight
+    error = actual_error.corrected(state.covariance, weight, told, state.mean[:, None], reckoned[:, None])
     assert (error == reckoned).all()

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from gateway.align import Fix
-from gateway.estimators import interaction
 from gateway.estimators.kalman import Motion, start
 from gateway.estimators.modes import Mixture, Mode, Modes, begin, combine, predict, update
 from gateway.fuse.filtering import Job, run
@@ -147,62 +146,6 @@ def test_the_imm_is_the_textbooks() -> None:
             np.testing.assert_allclose(mixture.covariance[i], book.covariance, rtol=AGREE, atol=AGREE * 400.0)
             np.testing.assert_allclose(state.mean[i], mean, rtol=AGREE, atol=AGREE)
             np.testing.assert_allclose(state.covariance[i], covariance, rtol=AGREE, atol=AGREE * 400.0)
-
-
-COLUMNS = ((3, 0, 5), (4, 0, 5), (5, 2, 3), (6, 6, 7), (7, 7, 8), (8, 8, 9))  # of the transition less the identity
-
-
-def _models(mixture: Mixture) -> interaction.Models:
-    """Tracks last, models before them."""
-    covariance = mixture.covariance.transpose(2, 3, 1, 0)
-    return interaction.Models(mixture.weight.T, mixture.mean.transpose(2, 1, 0), covariance)
-
-
-def _interacted(models: interaction.Models, t: float, measured: Floats, h: Floats | None) -> interaction.Models:
-    """One step of all tracks at once; without `h` the positions themselves are measured."""
-    moves = [_moves(mode, t) for mode in THREE.modes]
-    change = np.array([carry - np.eye(9) for carry, _ in moves]).transpose(1, 2, 0)[..., None]
-    noise = np.array([one for _, one in moves]).transpose(1, 2, 0)[..., None]
-    noise = 0.5 * (noise + noise.swapaxes(0, 1))
-    chance = THREE.transition(np.array([t])).transpose(1, 2, 0)
-    ahead = interaction.moved(interaction.mixed(models, chance), change, noise, COLUMNS)
-    variance = np.full((3, 1), SIGMA_M**2)
-    seen = slice(0, 9 if h is not None else 3)
-    return interaction.corrected(ahead, measured.T, variance, seen, None if h is None else h[:, :, None, None])
-
-
-@pytest.mark.parametrize("h", [None, SUM], ids=["position", "position and error"])
-def test_linear_models_of_many_tracks_at_once_are_the_textbooks(h: Floats | None) -> None:
-    """The same flights by the functions that have the tracks last and take one component after the other: to 1e-9."""
-    times = np.random.default_rng(1).uniform(0.3, 2.5, 15)
-    mixture = _started(10, THREE)
-    models = _models(mixture)
-    books = [Textbook(THREE, [*mixture.mean[i]], [*mixture.covariance[i]], [*mixture.weight[i]]) for i in range(10)]
-    for t, measured in zip(times.tolist(), _flown(mixture, times), strict=True):
-        models = _interacted(models, t, measured, h)
-        state = interaction.combined(models)
-        for i, book in enumerate(books):
-            book.step(t, measured[i], PLACE if h is None else h)
-            mean, covariance = book.combined()
-            np.testing.assert_allclose(models.weight[:, i], book.weight, rtol=1e-8)
-            np.testing.assert_allclose(models.mean[..., i].T, book.mean, rtol=AGREE, atol=AGREE)
-            np.testing.assert_allclose(state[0][:, i], mean, rtol=AGREE, atol=AGREE)
-            np.testing.assert_allclose(state[1][..., i], covariance, rtol=AGREE, atol=AGREE * 400.0)
-
-
-def test_linear_models_of_one_track_have_the_bits_that_they_have_among_many() -> None:
-    """A batch of 23 gives each track the very bits that it has alone, and covariances that are symmetric to the bit."""
-    mixture = _started(23, THREE)
-    together = _models(mixture)
-    alone = [_models(mixture.row(i)) for i in range(23)]
-    for measured in _flown(mixture, np.ones(6)):
-        together = _interacted(together, 1.0, measured, SUM)
-        for i in range(23):
-            alone[i] = _interacted(alone[i], 1.0, measured[i : i + 1], SUM)
-            assert alone[i].weight[:, 0].tobytes() == together.weight[:, i].tobytes()
-            assert alone[i].mean[..., 0].tobytes() == together.mean[..., i].tobytes()
-            assert alone[i].covariance[..., 0].tobytes() == together.covariance[..., i].tobytes()
-    assert np.array_equal(together.covariance, together.covariance.swapaxes(0, 1))
 
 
 @pytest.mark.skipif(

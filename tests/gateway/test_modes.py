@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gateway.estimators import kalman
 from gateway.estimators.kalman import Estimate, Motion, start
 from gateway.estimators.modes import LEAST_WEIGHT, Mixture, Mode, Modes, Rule, begin, combine, predict, update
-from gateway.estimators.turning import carried
+from gateway.estimators.turning import Shaken, carried
 
 Floats = NDArray[np.float64]
 
@@ -69,7 +69,7 @@ def _textbook_motion(t: float, rate: float, motion: Motion) -> tuple[Floats, Flo
 @pytest.mark.parametrize("elapsed_s", [0.02, 0.4, 5.0, 20.0])
 def test_a_turn_moves_as_its_differential_equation_says(rate: float, elapsed_s: float) -> None:
     """Transition and noise are those of x'' = rate x v + white noise, however long it lasts and however little it turns."""
-    carry, noise = carried([HARD], np.array([elapsed_s]), np.array([[rate]]))
+    carry, noise = carried(Shaken.of([HARD]), np.array([elapsed_s]), np.array([[rate]]))
     wanted, spread = _textbook_motion(elapsed_s, rate, HARD)
     # 1e-9: the series at 8 rad cancels from terms of a few hundred
     np.testing.assert_allclose(carry[0, 0], wanted, rtol=1e-9, atol=1e-9)
@@ -80,9 +80,9 @@ def test_a_turn_moves_as_its_differential_equation_says(rate: float, elapsed_s: 
 def test_two_moves_are_one(elapsed_s: float, share: float, rate: float) -> None:
     """Moving in two steps, wherever the time is cut, is moving in one: transition and noise."""
     rates = np.array([[rate]])
-    whole, noise = carried([HARD], np.array([elapsed_s]), rates)
-    first, before = carried([HARD], np.array([elapsed_s * share]), rates)
-    last, after = carried([HARD], np.array([elapsed_s * (1.0 - share)]), rates)
+    whole, noise = carried(Shaken.of([HARD]), np.array([elapsed_s]), rates)
+    first, before = carried(Shaken.of([HARD]), np.array([elapsed_s * share]), rates)
+    last, after = carried(Shaken.of([HARD]), np.array([elapsed_s * (1.0 - share)]), rates)
     np.testing.assert_allclose(last @ first, whole, rtol=1e-9, atol=1e-9)
     carried_noise = last @ before @ last.swapaxes(-1, -2) + after
     np.testing.assert_allclose(carried_noise, noise, rtol=1e-9, atol=1e-9 * max(float(noise.max()), 1.0))
