@@ -13,6 +13,7 @@ Source: 000 2.3, figure 3. Deviation: the print has no formula of P; it is where
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -32,6 +33,7 @@ LITERAL_ALIGNED_RAD = math.radians(7.5)  # `literal` turns to a point this close
 ROLL_OUT_RAD = math.radians(45.0)  # who is no more than this beyond its point turns back to it
 ON_CIRCLE = 1.3  # radii: who is this near to a circle's middle is on it
 FOR_GOOD_RAD = 1000.0
+QUARTERS, QUARTER_RAD = 8, 0.5 * math.pi  # of a circle: two turns, and all that is left at once
 MOST_LEAD = 2.0  # radii: no turn begins earlier before its point
 LEAST_SPEED_MPS = 0.1
 
@@ -193,18 +195,22 @@ def ahead(
     turn, rate, follows = _first_turn(now, speed, course, target, following, turning_rps, rule)
     turn, follows = np.where(arrived, 0.0, turn), follows | arrived
     ground = speed
+
+    def speed_on(heading: Floats) -> Floats:
+        return speed if wind is None else ground_speed(heading, speed, course, wind)
+
     for leg in range(route.shape[1]):
         if leg:
             target, arrived = _entered(path, following[:, leg], circles, leg)
             turn, rate = _next_turn(path, target, ground, turning_rps)
             turn = np.where(arrived, 0.0, turn)
         path.extend(ground, rate, turn / np.maximum(np.abs(rate), STRAIGHT_RPS), leg)
-        if wind is not None:
-            ground = ground_speed(path.course, speed, course, wind)
+        ground = speed_on(path.course)
         straight_m = np.where(arrived, 0.0, _straight(path, target, following[:, leg : leg + 2], ground / turning_rps))
         path.extend(ground, np.zeros(n), straight_m / ground, leg)
         if circles is not None:
-            _go_round(path, circles, leg, following, ground)
+            _go_round(path, circles, leg, following, speed_on)
+            ground = speed_on(path.course)
     path.stop(ground, np.zeros(n) if braking is None else braking, route.shape[1])
     on = _Path.at_start(now.position, course, path.horizons)
     on.extend(speed, now.turn_rate, np.zeros(n), 0)
@@ -243,8 +249,11 @@ def _entered(path: _Path, point: Floats, circles: Circles | None, leg: int) -> t
     return np.where((round_it & ~arrived)[:, None], entry, point), arrived
 
 
-def _go_round(path: _Path, circles: Circles, leg: int, following: Floats, ground: Floats) -> None:
-    """Round a leg's circle, where it has one, until the next point is ahead and the least angle is flown."""
+def _go_round(path: _Path, circles: Circles, leg: int, following: Floats, speed_on: Callable[[Floats], Floats]) -> None:
+    """Round a leg's circle, where it has one, until the next point is ahead and the least angle is flown.
+
+    In quarters, each at the ground speed of its middle.
+    """
     radius = circles.radius[:, leg]
     round_it = ~np.isnan(radius)
     if not round_it.any():
@@ -259,7 +268,11 @@ def _go_round(path: _Path, circles: Circles, leg: int, following: Floats, ground
     go = go + FULL_TURN * np.ceil(np.maximum(least - go, 0.0) / FULL_TURN)
     last = (following[:, leg + 1] == following[:, leg]).all(axis=1)
     go = np.where(round_it, np.where(last, FOR_GOOD_RAD, go), 0.0)
-    path.extend(ground, np.where(round_it, side * ground / size, 0.0), go * size / ground, leg)
+    for quarter in range(QUARTERS):
+        arc = np.minimum(go, QUARTER_RAD) if quarter + 1 < QUARTERS else go
+        ground = speed_on(path.course + 0.5 * side * np.minimum(arc, QUARTER_RAD))
+        path.extend(ground, np.where(round_it, side * ground / size, 0.0), arc * size / ground, leg)
+        go = go - arc
 
 
 def _first_turn(

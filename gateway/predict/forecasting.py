@@ -123,12 +123,11 @@ def forecast(
     tracks = tuple(lane.track for lane in lanes)
     before = predicting.remembered.of(tracks)
     state = _State.of(lanes, at, model)
-    now, courses, interval_s = motions(
+    now, minds = motions(
         before, at, state.position, state.velocity, state.velocity_sigma, state.sides, _usual_rate(state.speed, model)
     )
     routes = np.stack([one.route for one in goals])
-    chosen, minds = _chosen(before, at, now, goals, routes, state, site, frame)
-    minds = replace(minds, courses=courses, interval_s=interval_s, turn_rate=now.turn_rate)
+    chosen, minds = _chosen(before, minds, at, now, goals, routes, state, site, frame)
     horizons = state.since_s[:, None] + np.array(horizons_s)
     start = two_segment.Moving(state.at_position, state.velocity, np.where(chosen.circles, chosen.rate, now.turn_rate))
     around = beside(horizons)
@@ -143,13 +142,13 @@ def forecast(
         circles=chosen.rounds if np.isfinite(chosen.rounds.radius).any() else None,
     )
     ahead, by_points = whole.first(horizons.shape[1]), whole.follows | chosen.circles
-    sigma = spread(now, whole, horizons, state.place_sigma, state.velocity_sigma, _rests(chosen, whole))
+    sigma = spread(now, whole, horizons, state.place_sigma, _rests(chosen, whole), chosen.confidence)
     up = heights(state.up, state.climb, now, ahead, chosen.up, chosen.lands, chosen.route, horizons)
     mean = np.concatenate([ahead.position, up[..., None]], axis=2)
     told_names = [one.names[best] if best >= 0 else None for one, best in zip(goals, chosen.best.tolist(), strict=True)]
     made = Forecast(
         at,
-        tracks,
+        tuple(lane.number for lane in lanes),
         horizons_s,
         mean,
         ahead.course,
@@ -223,6 +222,7 @@ def _usual_rate(speed: Floats, model: Model) -> Floats:
 
 def _chosen(
     before: Minds,
+    minds: Minds,
     at: int,
     now: Motions,
     goals: Sequence[Goals],
@@ -275,8 +275,7 @@ def _chosen(
     rounds = two_segment.Circles(np.where((trusts | infers)[:, None], radius, math.nan), least)
     ends_round = ends_round & (trusts | infers)
     minds = replace(
-        before,
-        at=np.full(n, at),
+        minds,
         agreed=seen.agreed,
         length=seen.length,
         last=seen.last,

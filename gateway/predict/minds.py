@@ -27,7 +27,9 @@ class Minds:
     at: Ints  # (n,) ns, when these were thought; UNKNOWN = never
     courses: Floats  # (n, 2) at that time and at the one before, rad from east to north
     interval_s: Floats  # (n,) between the two
-    turn_rate: Floats  # (n,) rad/s, smoothed
+    speed: Floats  # (n,)
+    wander: Floats  # (n,) mean square of what the speed changes by in a second, faded; NaN = not known yet
+    unsettled: Floats  # (n,) radians that it turned by lately, faded
     agreed: Floats  # (n, 20), `intent.Seen`
     length: Floats  # (n,)
     last: Floats  # (n, 20)
@@ -46,6 +48,8 @@ class Minds:
             np.full(n, UNKNOWN),
             np.full((n, 2), math.nan),
             zero,
+            zero,
+            np.full(n, math.nan),
             zero,
             seen.agreed,
             seen.length,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,12 @@ STALE_S = 10.0  # after a gap as long as this the course begins anew
 RATE_MEMORY_S = 1.5  # of the turn rate that is measured from the course
 LEAST_RATE_RPS = math.radians(0.75)  # a slower turn is none
 SURE_SIGMAS = 3.0
+SPEED_SIGMAS = 1.5
+WANDER_MEMORY_S, WANDERS_LESS = (
+    20.0,
+    3.0,
+)  # a filter's velocity is wrong by no more than so often what it changes by in a second
+UNSETTLED_S = 8.0  # how long a turn is felt
 
 REACTS_S = 6.0  # after a new goal was declared the aircraft has this long to begin to turn
 TOLERATED_RAD = math.radians(10.0)  # sigma of a follower's course about the way to its goal
@@ -43,6 +49,9 @@ class Motions:
     side: Ints  # 1 left, -1 right, 0 where no turn is sure
     turn_rate: Floats  # of the turn, 0 where there is none
     turning: Floats  # how fast it turns when it does, rad/s
+    acceleration: Floats  # of the ground speed, as far as it is sure, m/s2
+    speed_sigma: Floats  # of the velocity, m/s: the filter's, or less where the speed hardly moves about
+    unsettled: Floats  # radians that it turned by lately
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +71,8 @@ def motions(
     velocity_sigma: Floats,
     sides: Floats,
     usual_rate: Floats,
-) -> tuple[Motions, Floats, Floats]:
-    """How n aircraft move now; and, to be remembered, their last two courses (n, 2) and the time between these.
+) -> tuple[Motions, Minds]:
+    """How n aircraft move now, and what is remembered of that.
 
     `sides` (n, 3) are the modes' probabilities of straight, left, right, NaN = no modes; `usual_rate` (n,) how fast one turns
     at this speed. The turn rate is what the course has changed by, weighed against the usual one by how well it is known.
@@ -85,9 +94,34 @@ def motions(
     known, assumed = 1.0 / np.maximum(sigma, 1e-4) ** 2, 1.0 / usual_sigma**2
     agrees = measured * side > 0.0
     rate = np.where(agrees, (measured * known + side * usual_rate * assumed) / (known + assumed), side * usual_rate)
-    courses = np.stack([course, np.where(fresh, math.nan, before.courses[:, 0])], axis=1)
-    now = Motions(position, velocity, speed, course, side, np.where(side == 0, 0.0, rate), usual_rate)
-    return now, courses, np.where(fresh, 0.0, elapsed_s)
+    gained = np.where(fresh, 0.0, np.maximum(np.abs(speed - before.speed) - SPEED_SIGMAS * velocity_sigma, 0.0))
+    gained = gained / np.where(fresh, 1.0, elapsed_s)
+    period_s = np.where(fresh, 1.0, elapsed_s)
+    wander = _wander(before, speed, fresh, period_s)
+    steady = np.where(np.isnan(wander), math.inf, WANDERS_LESS * np.sqrt(np.nan_to_num(wander)))
+    course_sigma = velocity_sigma / np.maximum(speed, LEAST_SPEED_MPS)
+    turned = np.where(fresh | (speed < LEAST_SPEED_MPS), 0.0, np.abs(wrapped(course - before.courses[:, 0])))
+    turned = turned**3 / np.maximum(turned * turned + (2.0 * course_sigma) ** 2, 1e-12)  # as far as it is no noise
+    unsettled = np.where(fresh, 0.0, before.unsettled * np.exp(-period_s / UNSETTLED_S)) + turned
+    minds = replace(
+        before,
+        at=np.full(len(speed), at),
+        courses=np.stack([course, np.where(fresh, math.nan, before.courses[:, 0])], axis=1),
+        interval_s=np.where(fresh, 0.0, elapsed_s),
+        speed=speed,
+        wander=wander,
+        unsettled=unsettled,
+    )
+    turn_rate, sure = np.where(side == 0, 0.0, rate), np.minimum(velocity_sigma, steady)
+    return Motions(position, velocity, speed, course, side, turn_rate, usual_rate, gained, sure, unsettled), minds
+
+
+def _wander(before: Minds, speed: Floats, fresh: Bools, period_s: Floats) -> Floats:
+    """The mean square (n,) of what the speed changes by in a second, faded; NaN = not known yet."""
+    change = (speed - before.speed) ** 2 / period_s
+    keep = np.exp(-period_s / WANDER_MEMORY_S)
+    after = np.where(np.isnan(before.wander), change, keep * np.nan_to_num(before.wander) + (1.0 - keep) * change)
+    return np.where(fresh, before.wander, after)
 
 
 def inferred(
