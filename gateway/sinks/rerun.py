@@ -18,6 +18,7 @@ from gateway.sinks.recording import optimise
 from gateway.sinks.scene.entry import Entry, made
 from gateway.sinks.scene.flown import Flights
 from gateway.sinks.scene.health import HealthScene
+from gateway.sinks.scene.later import Later
 from gateway.sinks.scene.paths import ApproachScene, PredictScene
 from gateway.sinks.scene.plans import PlanScene
 from gateway.sinks.scene.radars import MultiRadarScene
@@ -29,7 +30,8 @@ from gateway.sinks.scene.sources import SourceScene, raw_positions
 from gateway.sinks.scene.stages import StageScene
 from gateway.sinks.scene.tracks import TrackScene
 
-_ENTITY_NS = 1_000_000  # of session time for each that is drawn
+_ENTITY_NS = 500_000  # of session time for each that is drawn: a crowd takes a quarter of a core
+_CURVES_REST = 4  # of a crowd, curves are drawn so many times less often than what moves
 
 
 class RerunSink:
@@ -76,6 +78,7 @@ class RerunSink:
         self._rest_ns = self._period_ns
         self._waiting: list[Picture] = []
         self._rows = 0
+        self._later, self._draws = Later(), 0
         self._drawn_at: int | None = None
         self._send([*SiteScene(site).entries(), *self._scope.site_entries()])
 
@@ -127,6 +130,8 @@ class RerunSink:
     def _end(self, *, made_small: bool) -> None:
         try:
             self._draw()
+            if self._later:
+                self._send(self._later.take())
         finally:
             try:
                 if self._file and self._file.close() and made_small:
@@ -157,11 +162,21 @@ class RerunSink:
                 self._flights.end(ended.track, picture.now)
                 self._predict.end(ended.track, picture.now)
                 self._tracks.forget(ended.track)
-        # What is drawn of a crowd comes in larger batches: one entity costs a quarter of a millisecond, however many its rows.
-        self._rest_ns = max(self._period_ns, len(entries) * _ENTITY_NS)
+        entries = self._rested(entries)
         self._send(entries)
-        while entries:  # one by one: to free them all at once takes 20 ms, in which the receiving thread gets no turn
+        while entries:  # one by one: to free them all at once takes 20 ms, in which nothing else gets a turn
             entries.pop()
+
+    def _rested(self, entries: list[Entry]) -> list[Entry]:
+        """What is drawn of a crowd comes in larger batches, curves in the largest; how long to rest after them."""
+        urgent = self._later.without(entries)
+        entities = len(urgent) + len(self._later) / _CURVES_REST
+        self._rest_ns = max(self._period_ns, round(entities * _ENTITY_NS))
+        self._draws += 1
+        if self._rest_ns > self._period_ns and self._draws < _CURVES_REST:
+            return urgent
+        self._draws = 0
+        return [*urgent, *self._later.take()]
 
     def _send(self, entries: Sequence[Entry]) -> None:
         ready = made(entries)

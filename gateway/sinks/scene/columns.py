@@ -55,7 +55,7 @@ _FLAT, _SPACE, _TURN, _GROUND = (
 _POSITIONS_3D, _POSITIONS_2D = rr.Points3D.descriptor_positions(), rr.Points2D.descriptor_positions()
 _COLOURS_3D, _LABELS_3D = rr.Points3D.descriptor_colors(), rr.Points3D.descriptor_labels()
 _POSITIONS_MAP, _COLOURS_MAP = rr.GeoPoints.descriptor_positions(), rr.GeoPoints.descriptor_colors()
-_SCALARS, _ALBEDO = rr.Scalars.descriptor_scalars(), rr.Mesh3D.descriptor_albedo_factor()
+SCALARS, _ALBEDO = rr.Scalars.descriptor_scalars(), rr.Mesh3D.descriptor_albedo_factor()
 _TRANSLATION, _QUATERNION = rr.Transform3D.descriptor_translation(), rr.Transform3D.descriptor_quaternion()
 _STRIPS_3D, _STRIPS_MAP = rr.LineStrips3D.descriptor_strips(), rr.GeoLineStrings.descriptor_line_strings()
 _SCALE = rr.Transform3D.descriptor_scale()
@@ -88,12 +88,12 @@ def scalars(values: Floats) -> tuple[Column, ...]:
     """Values of plots: (n,), or (n, k) of k series."""
     count = len(values)
     wide = values.size // count if count else 1
-    return (Column(_SCALARS, _listed(_numbers(values, np.float64), np.arange(count + 1) * wide)),)
+    return (Column(SCALARS, _listed(_numbers(values, np.float64), np.arange(count + 1) * wide)),)
 
 
 def scalars_of(values: Floats, widths: ArrayLike) -> tuple[Column, ...]:
     """Values of plots (m,), so many series in each row (n,)."""
-    return (Column(_SCALARS, _listed(_numbers(values, np.float64), np.concatenate([[0], np.cumsum(widths)]))),)
+    return (Column(SCALARS, _listed(_numbers(values, np.float64), np.concatenate([[0], np.cumsum(widths)]))),)
 
 
 def strips_3d(strips: Sequence[Floats] | Floats, counts: ArrayLike) -> tuple[Column, ...]:
