@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gateway.align import Plot
+from gateway.align import SECOND, Plot
 from gateway.arriving import Arriving
 from gateway.track import Key
+
+PERIOD_TOLD_WITHIN_S = 20.0  # radars say it every few seconds
 
 Tracked = list[tuple[Plot, Key]]
 
@@ -38,6 +40,8 @@ class Tracking(Arriving):
                 self._say_crowded(radar)
             else:
                 self.count("plots without a number, of a radar that does not say how often it scans")
+                if (self.now or 0) - self.unnumbered.unknown_since[radar] < PERIOD_TOLD_WITHIN_S * SECOND:
+                    continue
                 self.once(
                     f"radar {radar} does not say how long a scan takes: its plots without a number become no tracks; add "
                     f"period_s to its [[radar]] in the site file"

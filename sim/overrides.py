@@ -52,7 +52,7 @@ _ANY_SIGN = (
     "time_error_s",
     "abeam_deg",
 )
-_COUNTS = {"aircraft": (0, LARGEST_SYSTEM), "radars": (0, 20), "first_number": (1, 60_000)}
+_COUNTS = {"aircraft": (0, LARGEST_SYSTEM), "radars": (0, 20), "first_number": (1, 60_000), "birds": (0, 1000)}
 
 
 def override(parameters: SceneParameters, changes: Iterable[str]) -> SceneParameters:

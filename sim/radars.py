@@ -12,6 +12,7 @@ from adapters.landing_radar import MAXIMUM_PLOTS, Header, Plot, Status, encode
 from gateway.frames import RadarFrame, RunwayFrame, turn
 from gateway.settings import RadarSite, Site
 from sim.earth import Flown
+from sim.moving_clutter import draw_birds, draw_rain
 from sim.scene import Scene, SceneRadar
 from sim.sensors import PlotsMeasured, RadarParameters, draw_clutter, during, measure_radar, scan_times, stream
 
@@ -132,9 +133,13 @@ def _plots_of_scans(scene: Scene, radar: SceneRadar, scans: Floats) -> list[list
     for number, there, measured in sightings(scene, radar):
         for place in np.flatnonzero(measured.seen):
             plots[there[place]].append((number, measured.polar[place], float(measured.radial_mps[place])))
-    which, polar = draw_clutter(radar.parameters, len(scans), stream(scene.seed, radar.name, "clutter"))
-    for scan, false_plot in zip(which.tolist(), polar, strict=True):
-        plots[scan].append((0, false_plot, math.nan))
+    clutter, birds, rain = (stream(scene.seed, radar.name, name) for name in ("clutter", "birds", "rain"))
+    strewn = [draw_clutter(radar.parameters, len(scans), clutter)]
+    strewn += [draw_birds(radar.parameters, scans, birds), draw_rain(radar.parameters, scans, rain)]
+    for which, polar in strewn:
+        for scan, false_plot in zip(which.tolist(), polar, strict=True):
+            if not np.isnan(false_plot).all():
+                plots[scan].append((0, false_plot, math.nan))
     for one in plots:
         one.sort(key=lambda plot: (math.isnan(plot[1][1]), plot[1][1], plot[0]))
     return plots

@@ -70,6 +70,8 @@ class RadarParameters:
     numbered: bool = True  # False: every plot has track number 0
     first_number: int = 1  # of the first aircraft; the next ones follow
     clutter_per_scan: float = 0.0  # mean of a Poisson number, uniform over the coverage up to 10 degrees
+    birds: int = 0  # about the approach, each on its own way
+    rain_per_scan: float = 0.0  # mean of a Poisson number of plots of a shower that drifts over the approach
     dropouts: Intervals = ()
     status_period_s: float = 5.0
     sigma_given: bool = False  # tell the sigmas in each plot

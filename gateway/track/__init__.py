@@ -1,6 +1,7 @@
 """Track: which plots belong together. The radar's own numbers decide; plots without one become tracks by `unnumbered`."""
 
 from gateway.track.numbered import (
+    FIRST_OWN,
     GREATEST_SPEED_MPS,
     PLOTS_AT_MOST,
     TRACKS_AT_MOST,
@@ -12,7 +13,7 @@ from gateway.track.numbered import (
     name_of,
     table,
 )
-from gateway.track.unnumbered import FIRST_OWN, Taken, Unnumbered
+from gateway.track.unnumbered import Taken, Unnumbered
 
 __all__ = [
     "FIRST_OWN",

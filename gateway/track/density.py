@@ -14,7 +14,9 @@ Ints = NDArray[np.int64]
 RANGES, AZIMUTHS = 64, 64  # cells
 ELEVATION_RAD = math.radians(10.0)  # over which clutter and targets are strewn
 LEARNT_IN = 20.0  # scans
-AT_FIRST = 0.5  # clutter plots a scan, over the whole coverage: what is expected before anything was seen
+KERNEL = (1.0 / 9.0, 2.0 / 9.0, 3.0 / 9.0, 2.0 / 9.0, 1.0 / 9.0)  # over neighbouring cells
+AT_FIRST_WORTH = 2.0  # scans, of what is expected at first
+AT_FIRST = 3.0  # clutter plots a scan, over the whole coverage: what is expected before anything was seen
 NEWBORN = 0.005  # targets that come, a scan, over the whole coverage
 FIRST_DETECTION, LEAST_DETECTION, MOST_DETECTION = 0.9, 0.5, 0.98
 LEAST = 1e-3  # clutter plots a scan: without any, one plot would be a track
@@ -28,6 +30,7 @@ class Density:
     counts: Floats
     greatest_m: float
     detection: float
+    scans: float = 0.0  # that were learnt from
     learns_clutter: bool = True
     learns_detection: bool = True
 
@@ -39,16 +42,17 @@ class Density:
             np.full((RANGES, AZIMUTHS), count),
             greatest_m,
             FIRST_DETECTION if detection is None else detection,
-            clutter is None,
-            detection is None,
+            learns_clutter=clutter is None,
+            learns_detection=detection is None,
         )
 
     def of(self, value: Floats) -> tuple[Floats, Floats]:
         """Clutter and new targets (m,) a scan in a unit of what each plot (3, m) measured: m, rad, rad or some of these."""
         ranges, azimuths = self._cells(value)
         missing = np.isnan(value)
-        by_azimuth, by_range, over_all = self.counts.sum(axis=0), self.counts.sum(axis=1), float(self.counts.sum())
-        count = self.counts[ranges, azimuths]
+        counts = np.maximum(self.counts, _smoothed(self.counts))
+        by_azimuth, by_range, over_all = counts.sum(axis=0), counts.sum(axis=1), float(counts.sum())
+        count = counts[ranges, azimuths]
         count = np.where(missing[0], by_azimuth[azimuths], count)
         count = np.where(missing[1], np.where(missing[0], over_all, by_range[ranges]), count)
         whole = np.array([self.greatest_m, 2.0 * math.pi, ELEVATION_RAD])[:, None]
@@ -64,14 +68,10 @@ class Density:
         ranges, azimuths = self._cells(value[:, placed])
         cells = np.bincount(ranges * AZIMUTHS + azimuths, unexplained[placed], minlength=RANGES * AZIMUTHS)
         grown = cells.reshape(RANGES, AZIMUTHS)
-        # What lies in a cell tells of its neighbours, too: clutter has no edges there, and rain moves.
-        spread = 0.5 * grown
-        spread[1:] += 0.125 * grown[:-1]
-        spread[:-1] += 0.125 * grown[1:]
-        spread += 0.125 * (np.roll(grown, 1, axis=1) + np.roll(grown, -1, axis=1))
         least = AT_FIRST / (RANGES * AZIMUTHS)
-        counts = np.maximum(self.counts * (1.0 - share / LEARNT_IN) + spread / LEARNT_IN, least)
-        return replace(self, counts=counts)
+        known = min(self.scans + AT_FIRST_WORTH, LEARNT_IN)
+        counts = np.maximum(self.counts * (1.0 - share / known) + grown / known, least)
+        return replace(self, counts=counts, scans=min(self.scans + share, LEARNT_IN))
 
     def detecting(self, hits: int, looks: int) -> Density:
         """The same after so many looks at confirmed tracks, of which so many had plots."""
@@ -86,3 +86,13 @@ class Density:
         ranges = np.clip(share[0] / self.greatest_m * RANGES, 0, RANGES - 1).astype(np.int64)
         azimuths = np.floor((share[1] / (2.0 * math.pi) + 0.5) * AZIMUTHS).astype(np.int64) % AZIMUTHS
         return ranges, azimuths
+
+
+def _smoothed(counts: Floats) -> Floats:
+    """What lies in a cell tells of its neighbours, too: clutter has no edges there, and rain moves into the next ones."""
+    padded = np.pad(counts, ((2, 2), (0, 0)), mode="edge")
+    along: Floats = sum(
+        (part * padded[place : place + RANGES] for place, part in enumerate(KERNEL)), np.zeros(counts.shape)
+    )
+    wide = np.concatenate([along[:, -2:], along, along[:, :2]], axis=1)
+    return sum((part * wide[:, place : place + AZIMUTHS] for place, part in enumerate(KERNEL)), np.zeros(counts.shape))

@@ -16,6 +16,7 @@ from gateway.align import SECOND, Plot
 
 GREATEST_SPEED_MPS = 600.0  # beyond any aircraft that a landing radar meets
 GREATEST_SILENCE_S = 10.0
+FIRST_OWN = 100_001  # radars number with 16 bits; from here on numbers are ours, and each is one target's for ever
 PLOTS_AT_MOST = 1024  # of one radar track
 TRACKS_AT_MOST = 10_000
 
@@ -117,6 +118,8 @@ class RadarTracks:
 
     def _is_new(self, key: Key, known: tuple[Plot, ...], plot: Plot) -> bool:
         """Whether a plot with this number begins another radar track than the number's present one."""
+        if plot.number >= FIRST_OWN:
+            return False
         if not known:
             return plot.at - self.silent.get(key[:2], plot.at) > GREATEST_SILENCE_S * SECOND
         if plot.at <= known[-1].at:

@@ -23,11 +23,11 @@ from gateway.align import SECOND, Plot
 from gateway.estimators.track_splitting import Bank, Plots, Splitting, scan
 from gateway.settings import Options, RadarSite
 from gateway.track.density import Density
+from gateway.track.numbered import FIRST_OWN
 from gateway.track.sight import RadarSight
 
 Floats = NDArray[np.float64]
 
-FIRST_OWN = 100_001  # radars number with 16 bits
 SLICES = 4  # of a period
 WAIT_NS = SECOND // 10  # for the other plots of a scan
 GREATEST_LEVEL_MPS, GREATEST_CLIMB_MPS = 300.0, 40.0
@@ -36,7 +36,8 @@ BUDGET = 2000  # hypotheses of a radar
 PLOTS_AT_MOST = 10_000  # of a slice
 WAITING_AT_MOST = 20_000
 SURE = 0.5  # a plot is told of a family that has it with more than this weight
-SURE_SIGMAS = 3.1  # of a speed: one in a thousand
+SURE_SIGMAS = 4.5  # of a speed: three in a million, because dozens of birds are asked after every scan
+CONFIRM_AT = 0.9999
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,6 +87,7 @@ class Unnumbered:
     watches: Mapping[int, Watch] = field(default_factory=dict)
     periods_s: Mapping[int, float] = field(default_factory=dict)
     next_numbers: Mapping[int, int] = field(default_factory=dict)  # of radars whose watch was given up
+    unknown_since: Mapping[int, int] = field(default_factory=dict)  # radars that do not say how often they scan
 
     @property
     def due(self) -> int | None:
@@ -103,7 +105,7 @@ class Unnumbered:
     ) -> tuple[Unnumbered, list[Plot]]:
         """The same with an arrival's plots, which wait; and those that cannot: too many do, or no period is known."""
         watches = dict(self.watches)
-        unused: list[Plot] = []
+        unused, unknown = list[Plot](), self.unknown_since
         by_radar: dict[int, list[Plot]] = {}
         for plot in plots:
             by_radar.setdefault(plot.radar, []).append(plot)
@@ -111,12 +113,13 @@ class Unnumbered:
             watch = self._watch(radar, radars[radar], some[0].at)
             if watch is None:
                 unused += some
+                unknown = {radar: now, **unknown}
                 continue
             room = max(WAITING_AT_MOST - len(watch.waiting), 0)
             unused += some[room:]
             due = now + WAIT_NS if watch.due is None else watch.due
             watches[radar] = replace(watch, waiting=(*watch.waiting, *some[:room]), due=due)
-        return replace(self, watches=watches), unused
+        return replace(self, watches=watches, unknown_since=unknown), unused
 
     def _watch(self, radar: int, site: RadarSite, at: int) -> Watch | None:
         """A radar's watch, begun anew where there is none or the radar's period has changed."""
@@ -161,7 +164,7 @@ class Unnumbered:
                 numbers = {family: number for family, number in watch.numbers.items() if family in named}
                 watch = replace(watch, base=(last.bank, last.density), slices=kept, numbers=numbers)
             watches[radar] = watch
-        return Unnumbered(watches, self.periods_s, next_numbers)
+        return replace(self, watches=watches, next_numbers=next_numbers)
 
     def emptied(self) -> Unnumbered:
         """The same when the session begins anew: nothing is remembered but which numbers were given."""
@@ -213,11 +216,13 @@ def _slice(
 ) -> Slice:
     """One slice worked after another."""
     at = plots[-1].at
-    share = min(max((at - bank.at) / SECOND / watch.period_s, 0.0), 1.0)
+    share = min((at - bank.at) / SECOND / watch.period_s, 1.0) if density.scans else 1.0
     if (at - bank.at) / SECOND > max(FORGOTTEN_S, FORGOTTEN_SCANS * watch.period_s):
         bank = Bank.empty(at, 3)  # nothing holds over such a time
     value = np.array([plot.polar for plot in plots]).T
     variance = np.array([plot.sigma for plot in plots]).T ** 2
+    if not density.scans:  # nothing is known yet: this piece itself tells how dense it is here
+        density = density.after(value, np.ones(len(plots)), share)
     clutter, newborn = density.of(value)
     serial = np.array([plot.serial for plot in plots], dtype=np.int64)
     seen = Plots(value, variance, clutter, newborn, np.array([plot.at for plot in plots], dtype=np.int64), serial)
@@ -246,7 +251,7 @@ def _splitting(density: Density, options: Options) -> Splitting:
     level = options.acceleration_sigma_mps2**2 * options.acceleration_time_s
     upright = options.vertical_acceleration_sigma_mps2**2 * options.acceleration_time_s
     speeds = GREATEST_LEVEL_MPS, GREATEST_LEVEL_MPS, GREATEST_CLIMB_MPS
-    return Splitting((level, level, upright), speeds, density.detection, budget=BUDGET)
+    return Splitting((level, level, upright), speeds, density.detection, confirm_at=CONFIRM_AT, budget=BUDGET)
 
 
 def _flying(bank: Bank, was: set[int], slowest_mps: float) -> Bank:
