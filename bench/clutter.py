@@ -20,6 +20,7 @@ from bench.measure import ChildFailed, Figure, environment
 SIZES = {2: (30, 9), 10: (30, 9), 50: (25, 3), 200: (15, 1)}  # targets: scans of a run, and runs at most
 JOINT_RATIO, NEAREST_RATIO = {2: 20.0, 50: 200.0, 200: 200.0}, {50: 50.0, 200: 50.0}
 MS_AT_MOST = {200: 10.0}
+PAPER_SCANS, PAPER_RATIO = 40, 4.0
 
 
 def clutter(runs: int, say: Callable[[str], None]) -> list[Figure]:
@@ -47,6 +48,11 @@ def clutter(runs: int, say: Callable[[str], None]) -> list[Figure]:
             mean_m = sum(found["gospa"]) / len(found["gospa"])
             ours_m = sum(sides["ours"]["gospa"]) / len(found["gospa"])
             figures.append(Figure(f"… GOSPA: {side}", "m", (mean_m,), at_least=None if side == "ours" else ours_m))
+    if told["paper"] is not None:
+        ours, theirs = told["paper"]["ours"], told["paper"]["JPDA"]
+        figures.append(Figure("paper 002-6's case, a scan: ours finds both", "ms", tuple(ours)))
+        ratio = tuple(one / other for one, other in zip(theirs, ours, strict=True))
+        figures.append(Figure("… JPDA, which knows both / ours", "", ratio, at_least=PAPER_RATIO))
     return figures
 
 
@@ -76,7 +82,28 @@ def measure(runs: int) -> dict[str, Any]:
                     apart.append(gospa(np.linalg.norm(true_m[:, :, None, place] - position[None], axis=1)))
                 found[name]["ms"].append(1e3 * spent_s / scans)
                 found[name]["gospa"].append(float(np.mean(apart)))
-    return {"sides": told, "left out": left_out}
+    return {"sides": told, "left out": left_out, "paper": _paper(runs) if there else None}
+
+
+def _paper(runs: int) -> dict[str, list[float]]:
+    """Milliseconds a scan in the paper's case: ours, which finds both targets among 200 plots, and JPDA, which knows them."""
+    import numpy as np
+
+    from bench.clutter_sides import joint_of_known, ours
+    from sim.studies.clutter import DENSITY, PERIOD_S, plots_of, targets
+
+    true_m = targets(PAPER_SCANS)
+    rate = np.gradient(true_m, PERIOD_S, axis=2)
+    spent: dict[str, list[float]] = {"ours": [], "JPDA": []}
+    for turn in range(runs):
+        drawn = list(plots_of(true_m, np.random.default_rng([turn, 0])))
+        known = np.concatenate([true_m[:, :, 0].T, rate[:, :, 0].T])
+        for name, tracker in (("ours", ours(DENSITY)), ("JPDA", joint_of_known(DENSITY, known, 0))):
+            some = drawn if name == "ours" else drawn[1:]
+            first = len(drawn) - len(some)
+            each = [tracker(plots, round((first + k) * PERIOD_S * 1e9))[1] for k, plots in enumerate(some)]
+            spent[name].append(1e3 * float(np.mean(each)))
+    return spent
 
 
 def _straight(targets: int, scans: int, random: Any) -> Any:

@@ -48,6 +48,19 @@ def joint(clutter: float) -> Tracker:
     return parts.tracker(MultiTargetMixtureTracker, JPDAwithLBP(hypothesiser))
 
 
+def joint_of_known(clutter: float, state: Floats, at: int) -> Tracker:
+    """The same from known tracks, (4, n) of x, y and their rates at an instant, ns: nothing begins and nothing ends."""
+    from stonesoup.dataassociator.probability import JPDAwithLBP
+    from stonesoup.hypothesiser.probability import PDAHypothesiser
+    from stonesoup.tracker.simple import MultiTargetMixtureTracker
+
+    parts = _Parts()
+    hypothesiser = PDAHypothesiser(
+        parts.predictor, parts.updater, clutter, prob_detect=DETECTION, prob_gate=0.999, include_all=False
+    )
+    return parts.tracker(MultiTargetMixtureTracker, JPDAwithLBP(hypothesiser), (state, at))
+
+
 def nearest(clutter: float) -> Tracker:
     """Stone Soup's global nearest neighbour behind a kd-tree."""
     from stonesoup.tracker.simple import MultiTargetTracker
@@ -86,14 +99,15 @@ class _Parts:
             max_distance=GREATEST_DISTANCE_M,
         )
 
-    def tracker(self, kind: Any, associator: Any) -> Tracker:
-        """A whole tracker, fed scan by scan."""
+    def tracker(self, kind: Any, associator: Any, known: tuple[Floats, int] | None = None) -> Tracker:
+        """A whole tracker, fed scan by scan; with what is known at an instant it finds nothing and ends nothing."""
         from datetime import UTC, datetime, timedelta
 
         from stonesoup.deleter.time import UpdateTimeStepsDeleter
         from stonesoup.initiator.simple import MultiMeasurementInitiator
         from stonesoup.types.detection import Detection
         from stonesoup.types.state import GaussianState
+        from stonesoup.types.track import Track
 
         begin, waiting = datetime(2026, 1, 1, tzinfo=UTC), []
         prior = GaussianState(np.zeros((4, 1)), np.diag([SIGMA_M**2, SPEED_SIGMA_MPS**2] * 2), timestamp=begin)
@@ -110,7 +124,14 @@ class _Parts:
             while True:
                 yield waiting.pop()
 
-        made = kind(initiator, UpdateTimeStepsDeleter(ENDS_AFTER), detections(), associator, self.updater)
+        if known is None:
+            made = kind(initiator, UpdateTimeStepsDeleter(ENDS_AFTER), detections(), associator, self.updater)
+        else:
+            made = kind(_Nobody(), UpdateTimeStepsDeleter(10**9), detections(), associator, self.updater)
+            since = begin + timedelta(seconds=known[1] / 1e9)
+            made._tracks = {
+                Track([GaussianState(one, prior.covar, timestamp=since)]) for one in known[0].T[:, [0, 2, 1, 3], None]
+            }
         each = iter(made)
 
         def scan(plots: Plots, at: int) -> tuple[Floats, float]:
@@ -123,6 +144,14 @@ class _Parts:
             return np.array(told).reshape(-1, 2).T, spent_s
 
         return scan
+
+
+class _Nobody:
+    """An initiator that begins nothing."""
+
+    def initiate(self, detections: Any, timestamp: Any) -> set[Any]:
+        """No track."""
+        return set()
 
 
 SIDES: dict[str, Callable[[float], Tracker]] = {"ours": ours, "JPDA": joint, "nearest neighbour, kd-tree": nearest}
