@@ -31,7 +31,8 @@ Ints = NDArray[np.int64]
 EACH = 4  # parameters of a radar
 BLOCK = EACH + 3  # of a radar and a position source
 AIRCRAFT_AT_MOST, RADARS_AT_MOST = 2048, 8  # what more there is tells nothing: a bound on memory and time
-HUBER = 2.5  # a component further off than this (sigmas) counts less
+HUBER = 2.5  # a component further off than this (sigmas) counts less,
+WRONG = 6.0  # and a pair with one further off than this not at all: a radar that changed is noticed otherwise
 
 Link = tuple[str, int]  # aircraft, radar
 
@@ -143,21 +144,31 @@ def without(evidence: Evidence, radar: int) -> Evidence:
     if radar not in evidence.radars:
         return evidence
     stays = [place for place, link in enumerate(evidence.links) if link[1] != radar]
-    total, vector = (part.copy() for part in evidence.folded)
-    place, others = evidence.place_of(radar), np.ones(len(vector), np.bool_)
+    place, others = evidence.place_of(radar), np.ones(len(evidence.folded[1]), np.bool_)
     others[place] = False
-    gain = total[others, place] @ np.linalg.pinv(total[place, place], hermitian=True)
-    left = total[np.ix_(others, others)] - gain @ total[place, others]
-    back = vector[others] - gain @ vector[place]
+    total, vector = without_past(evidence, radar).folded
     return Evidence(
         tuple(evidence.links[one] for one in stays),
         evidence.information[stays],
         evidence.vector[stays],
         evidence.last[stays],
         tuple(number for number in evidence.radars if number != radar),
-        (left, back),
+        (total[np.ix_(others, others)], vector[others]),
         tuple(n for n, number in zip(evidence.pairs, evidence.radars, strict=True) if number != radar),
     )
+
+
+def without_past(evidence: Evidence, radar: int) -> Evidence:
+    """The evidence without what aircraft that left, and earlier sessions, told of a radar's errors."""
+    total, vector = (part.copy() for part in evidence.folded)
+    place, others = evidence.place_of(radar), np.ones(len(vector), np.bool_)
+    others[place] = False
+    gain = total[others, place] @ np.linalg.pinv(total[place, place], hermitian=True)
+    total[np.ix_(others, others)] -= gain @ total[place, others]
+    vector[others] -= gain @ vector[place]
+    total[place, :] = total[:, place] = 0.0
+    vector[place] = 0.0
+    return replace(evidence, folded=(total, vector))
 
 
 def with_radars(evidence: Evidence, numbers: Sequence[int]) -> Evidence:
@@ -197,4 +208,5 @@ def _weights(pairs: Pairs, solution: Solution | None) -> Floats:
         return weight
     left, variance = solution.left(pairs)
     distance = np.abs(np.nan_to_num(left)) / np.sqrt(variance)
-    return weight * np.where(distance > HUBER, HUBER / np.maximum(distance, HUBER), 1.0)
+    less = np.where(distance > HUBER, HUBER / np.maximum(distance, HUBER), 1.0)
+    return weight * less * (distance <= WRONG).all(axis=1)[:, None]

@@ -7,7 +7,7 @@ flagged: a parameter with a part in a direction that is known 30 times worse tha
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ RADAR_SIGMA = np.array([2000.0, 0.1, 0.1, 0.15])
 _OWN_LEAST_M = 1.0
 _OWN_ROUNDS = 12
 _OWN_SETTLED = 3e-3
+_OWN_BOUND = 3.0  # an own error larger than this (sigmas) pulls no more than one at the bound (Huber)
 _OWN_FREEDOM = 3.0  # the prior of own errors' size weighs as much as one aircraft
 _WEAK = 1.0 / 30.0**2  # of the largest eigenvalue: geometry does not tell what lies along such a direction
 _SHARE = 0.2  # a parameter with more than this of a weak direction is not observable
@@ -66,7 +67,7 @@ class Solution:
     def left(self, pairs: Pairs) -> tuple[Floats, Floats]:
         """How far pairs are (n, 3) from what is expected, each aircraft's own error included; and the variance of that.
 
-        Of a radar that was not heard before nothing is expected: then it is nothing, of infinite variance.
+        Of a radar that was not heard before nothing is expected: its variance is infinite.
         """
         radar_of = {radar: place for place, radar in enumerate(self.radars)}
         radar = np.array([radar_of.get(one, -1) for one in pairs.radar], np.intp)
@@ -101,16 +102,18 @@ def solved(
     equations = _Equations.of(evidence)
     prior = np.concatenate([np.tile(RADAR_SIGMA**-2.0, len(evidence.radars)), np.full(3, common_sigma_m**-2.0)])
     own = own_sigma_m if before is None else before.own_sigma_m
+    wide = np.ones(len(equations.aircraft))  # of aircraft that are further off than the others: their own errors' size
     for _ in range(_OWN_ROUNDS):
-        apart = equations.apart(own)
-        information, vector = equations.without_own(own, apart)
+        apart = equations.apart(own * wide)
+        information, vector = equations.without_own(own * wide, apart)
         error, covariance = _inverted(information + np.diag(prior), vector)
-        place, variance, across = equations.places(error, covariance, own, apart)
+        place, variance, across = equations.places(error, covariance, own * wide, apart)
         off = place - error[-3:]
-        unsure = _trace(variance) + len(place) * _trace(covariance[-3:, -3:]) - 2.0 * _trace(across[:, -3:, :])
-        known = _OWN_FREEDOM + 3.0 * len(place)
-        square = (_OWN_FREEDOM * own_sigma_m**2 + float((off * off).sum()) + unsure) / known
-        renewed = max(math.sqrt(square), _OWN_LEAST_M)
+        unsure = _trace(variance) + _trace(covariance[-3:, -3:]) - 2.0 * _trace(across[:, -3:, :])
+        square = ((off * off).sum(axis=1) + unsure) / wide**2
+        mean = (_OWN_FREEDOM * own_sigma_m**2 + float(square.sum())) / (_OWN_FREEDOM + 3.0 * len(place))
+        renewed = max(math.sqrt(mean), _OWN_LEAST_M)
+        wide = np.sqrt(np.maximum(np.sqrt((off * off).sum(axis=1)) / (_OWN_BOUND * renewed), 1.0))
         done, own = abs(renewed - own) < _OWN_SETTLED * own, renewed
         if done:
             break
@@ -142,10 +145,31 @@ def folded(evidence: Evidence, before: int, own_sigma_m: float) -> Evidence:
     stays = sorted(set(range(len(evidence.links))) - set(gone))
     left, rest = _some(evidence, gone), _some(evidence, stays)
     equations = _Equations.of(left)
-    total, vector = equations.without_own(own_sigma_m, equations.apart(own_sigma_m))
+    own_m = np.full(len(equations.aircraft), own_sigma_m)
+    total, vector = equations.without_own(own_m, equations.apart(own_m))
     return Evidence(
         rest.links, rest.information, rest.vector, rest.last, evidence.radars, (total, vector), evidence.pairs
     )
+
+
+def against_past(evidence: Evidence, own_sigma_m: float, common_sigma_m: float = COMMON_SIGMA_M) -> dict[int, float]:
+    """Chi-square, 4 degrees, of each radar's errors as present aircraft tell them against what was folded or remembered.
+
+    Only of radars of which both tell something.
+    """
+    equations = _Equations.of(evidence)
+    past, nothing = evidence.folded, (np.zeros_like(evidence.folded[0]), np.zeros_like(evidence.folded[1]))
+    own_m = np.full(len(equations.aircraft), own_sigma_m)
+    present = replace(equations, folded=nothing).without_own(own_m, equations.apart(own_m))
+    prior = np.concatenate([np.tile(RADAR_SIGMA**-2.0, len(evidence.radars)), np.full(3, common_sigma_m**-2.0)])
+    (now, unsure), (then, before) = (_inverted(told + np.diag(prior), by) for told, by in (present, past))
+    found = {}
+    for radar in evidence.radars:
+        place = evidence.place_of(radar)
+        if min(np.diagonal(one)[place].max() for one, _ in (present, past)) > 0.0:
+            off, spread = now[place] - then[place], unsure[place, place] + before[place, place]
+            found[radar] = float(off @ np.linalg.solve(spread, off))
+    return found
 
 
 def _some(evidence: Evidence, places: list[int]) -> Evidence:
@@ -192,35 +216,36 @@ class _Equations:
         np.add.at(by_place, rows, evidence.vector[:, EACH:])
         return cls(names, radars, by_radars, cross, place, by_place, evidence.folded)
 
-    def apart(self, own_m: float) -> Floats:
-        """The covariance of each place for given other errors, (k, 3, 3)."""
-        return np.asarray(np.linalg.inv(self.place + np.eye(3) / own_m**2))
+    def apart(self, own_m: Floats) -> Floats:
+        """The covariance of each place for given other errors, (k, 3, 3), own errors being so large (k,)."""
+        return np.asarray(np.linalg.inv(self.place + np.eye(3) * (own_m**-2.0)[:, None, None]))
 
-    def without_own(self, own_m: float, apart: Floats) -> tuple[Floats, Floats]:
-        """Information and vector of radars' errors and the common one, own errors of this size eliminated."""
-        gain, weight = self.cross @ apart, own_m**-2.0
+    def without_own(self, own_m: Floats, apart: Floats) -> tuple[Floats, Floats]:
+        """Information and vector of radars' errors and the common one, own errors of this size (k,) eliminated."""
+        gain, weight = self.cross @ apart, (own_m**-2.0)[:, None, None]
         total, vector = self.folded[0].copy(), self.folded[1].copy()
         total[:-3, :-3] += (self.radars - gain @ self.cross.swapaxes(-1, -2)).sum(axis=0)
-        total[:-3, -3:] += weight * gain.sum(axis=0)
+        total[:-3, -3:] += (weight * gain).sum(axis=0)
         total[-3:, :-3] = total[:-3, -3:].T
-        shared = weight * (apart @ self.place).sum(axis=0)
+        shared = (weight * (apart @ self.place)).sum(axis=0)
         total[-3:, -3:] += 0.5 * (shared + shared.T)
         vector[:-3] += (self.by_radars - (gain @ self.by_place[..., None])[..., 0]).sum(axis=0)
-        vector[-3:] += weight * (apart @ self.by_place[..., None])[..., 0].sum(axis=0)
+        vector[-3:] += (weight * (apart @ self.by_place[..., None]))[..., 0].sum(axis=0)
         return total, vector
 
-    def places(self, error: Floats, covariance: Floats, own_m: float, apart: Floats) -> tuple[Floats, Floats, Floats]:
+    def places(self, error: Floats, covariance: Floats, own_m: Floats, apart: Floats) -> tuple[Floats, Floats, Floats]:
         """The whole error of each aircraft's source (k, 3), its covariance (k, 3, 3), and that with all others (k, p, 3)."""
+        weight = (own_m**-2.0)[:, None]
         by_radars = (self.cross.swapaxes(-1, -2) @ error[:-3, None])[..., 0]
-        place = (apart @ (self.by_place - by_radars + error[-3:] * own_m**-2.0)[..., None])[..., 0]
-        back = np.concatenate([-(self.cross @ apart).swapaxes(-1, -2), apart * own_m**-2.0], axis=-1)
+        place = (apart @ (self.by_place - by_radars + error[-3:] * weight)[..., None])[..., 0]
+        back = np.concatenate([-(self.cross @ apart).swapaxes(-1, -2), apart * weight[..., None]], axis=-1)
         across = (back @ covariance).swapaxes(-1, -2)
         return place, apart + back @ across, across
 
 
-def _trace(matrices: Floats) -> float:
-    """The sum of all diagonals of (..., 3, 3)."""
-    return float(np.trace(matrices, axis1=-2, axis2=-1).sum())
+def _trace(matrices: Floats) -> Floats:
+    """The sums of the diagonals of (..., 3, 3)."""
+    return np.asarray(np.trace(matrices, axis1=-2, axis2=-1))
 
 
 def _inverted(information: Floats, vector: Floats) -> tuple[Floats, Floats]:

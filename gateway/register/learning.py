@@ -22,8 +22,9 @@ from gateway.estimators.registration_evidence import (
     learnt,
     remembering,
     without,
+    without_past,
 )
-from gateway.estimators.registration_solution import Solution, folded, solved
+from gateway.estimators.registration_solution import Solution, against_past, folded, solved
 from gateway.register.choosing import LEAST_PAIRS, Choice, chosen
 from gateway.register.corrections import Steps, largest_step, stated
 from gateway.register.pairing import Gathered
@@ -34,6 +35,8 @@ from gateway.settings import PositionSource, RadarSite, Registering
 
 Floats = NDArray[np.float64]
 
+PRIOR_CHI_SQUARE = 16.3  # three degrees of freedom, 99.9 %
+PAST_CHI_SQUARE = 30.0  # four; it is looked at every few seconds, and has to be so twice
 FADES_S = 1200.0  # time constant, over seconds in which something was learnt
 SOLVED_EACH_NS = 5 * SECOND
 FOLDED_AFTER_NS = 300 * SECOND  # an aircraft without pairs for so long has left
@@ -59,6 +62,7 @@ class Registration:
     choices: Mapping[int, Choice] = field(default_factory=dict)
     watches: Mapping[int, Watch] = field(default_factory=dict)
     is_prior_wrong: bool = False
+    doubted: frozenset[int] = frozenset()  # radars that present aircraft tell otherwise than those before
     is_new: bool = False  # whether there is evidence that the solution does not know
     learnt_until: int = 0  # reports before this are in
     remembered: Remembered | None = None  # from an earlier session, of radars that are not met yet too
@@ -127,7 +131,7 @@ class Registration:
         """Whether radars still measure as was learnt; what was learnt of one that does not is given up."""
         if self.solution is None:
             return self, []
-        after, said, pairs = self, list[Said](), gathered.pairs
+        said, pairs = list[Said](), gathered.pairs
         left, variance = self.solution.left(pairs)
         numbers, watches = np.array(pairs.radar), dict(self.watches)
         for number in dict.fromkeys(pairs.radar):
@@ -138,25 +142,27 @@ class Registration:
             whose = {pairs.aircraft[place] for place in np.flatnonzero(mine).tolist()}
             watch = watches.get(number, Watch())
             watches[number] = watch.seeing(left[mine], variance[mine], pairs.sigma[mine], usual, len(whose))
-            if watches[number].is_sure:
-                del watches[number]
-                after, told = after._given_up(radar)
-                said.append(told)
-        return replace(after, watches=watches), said
+        sure = [number for number, watch in watches.items() if watch.is_sure]
+        after = replace(self, watches=watches)
+        for number in sure:
+            after, told = after._given_up(radars[number])
+            said.append(told)
+        return after, said
 
     def _given_up(self, radar: RadarSite) -> tuple[Registration, Said]:
-        """A radar that was moved or repaired: it is learnt anew, and until then what the site file says is taken off."""
+        """A radar that was moved or repaired while aircraft were watched: all that was learnt of it is forgotten."""
+        after, said = self._unlearnt(radar)
+        return replace(after, evidence=without(after.evidence, radar.number)), said
+
+    def _unlearnt(self, radar: RadarSite) -> tuple[Registration, Said]:
+        """A radar is learnt anew, and until then what the site file says is taken off."""
         number = radar.number
         was = self.choices.get(number)
         more = ", no longer taken off," if was is not None and any(was.applied) else ""
         text = f"radar {number} suddenly measures otherwise: what was learnt of its errors is given up{more} and learnt anew"
-        after = replace(
-            self,
-            evidence=without(self.evidence, number),
-            solution=None,
-            choices={**self.choices, number: Choice.nothing(stated(radar))},
-        )
-        return after, Said("warning", text)
+        choices = {**self.choices, number: Choice.nothing(stated(radar))}
+        watches = {one: watch for one, watch in self.watches.items() if one != number}
+        return replace(self, solution=None, choices=choices, watches=watches), Said("warning", text)
 
     def _solving(
         self, radars: Mapping[int, RadarSite], position: PositionSource, use: Registering, at: int
@@ -166,11 +172,18 @@ class Registration:
         common_m = max(position.systematic_m, 1.0) * COMMON_SHARE
         own_m = usual_m if self.solution is None else self.solution.own_sigma_m
         evidence = folded(self.evidence, at - FOLDED_AFTER_NS, own_m)
-        solution = solved(evidence, usual_m, common_m, self.solution)
+        past = against_past(evidence, own_m, common_m) if evidence.links else {}
+        doubted = frozenset(radar for radar, chi_square in past.items() if chi_square > PAST_CHI_SQUARE)
+        given_up, said = self, list[Said]()
+        for radar in sorted(doubted & self.doubted & radars.keys()):
+            evidence = without_past(evidence, radar)
+            given_up, told = given_up._unlearnt(radars[radar])
+            said.append(told)
+        solution = solved(evidence, usual_m, common_m, given_up.solution)
         if solution is None:
-            return replace(self, evidence=evidence, solution=None, is_new=False), []
+            return replace(given_up, evidence=evidence, solution=None, is_new=False), said
         wrong = solution.prior_chi_square > PRIOR_CHI_SQUARE
-        said, choices = list[Said](), dict(self.choices)
+        choices = dict(given_up.choices)
         if wrong and not self.is_prior_wrong:
             said.append(Said("warning", _prior_in_words(solution)))
         pairs = dict(zip(evidence.radars, evidence.pairs, strict=True))
@@ -181,8 +194,8 @@ class Registration:
             before = choices.get(number, Choice.nothing(stated(radar)))
             choices[number], told = chosen(before, _verdicts(solution, radar), radar, use, at, trusted=not wrong)
             said += [Said("info", text) for text in told]
-        known = replace(self, evidence=evidence, solution=solution, solved_at=at, is_new=False)
-        return replace(known, choices=choices, is_prior_wrong=wrong), said
+        known = replace(given_up, evidence=evidence, solution=solution, solved_at=at, is_new=False)
+        return replace(known, choices=choices, is_prior_wrong=wrong, doubted=doubted), said
 
     def _stepping(self, radars: Mapping[int, RadarSite], at: int, ahead: int) -> Registration:
         """A step further towards what is to be taken off; what held before anything that can still come is forgotten."""
@@ -256,9 +269,6 @@ class Registration:
             place = radar.along_m, radar.left_m, radar.antenna_height_m, radar.compass_boresight_rad
             rows.append(RememberedRadar(number, *place, error, sigma))
         return Remembered(at, *runway, tuple(rows)) if rows else None
-
-
-PRIOR_CHI_SQUARE = 16.3  # three degrees of freedom, 99.9 %
 
 
 def _verdicts(solution: Solution, radar: RadarSite) -> tuple[Verdict, ...]:

@@ -60,14 +60,14 @@ def last(evidence: Evidence) -> Solution:
 
 @pytest.mark.parametrize(("own_m", "common_m"), [(0.0, (30.0, -20.0, 25.0)), (10.0, (0.0, 0.0, 0.0))])
 def test_in_five_minutes_of_ten_aircraft_a_radar_is_known(own_m: float, common_m: tuple[float, float, float]) -> None:
-    off = np.array([last(watched(Sky(seed, own_m, common_m), 300)).error[0] - [*ERROR, LATE_S] for seed in range(8)])
+    off = np.array([last(watched(Sky(seed, own_m, common_m), 300)).error[0] - [*ERROR, LATE_S] for seed in range(4)])
     assert np.sqrt((off[:, 0] ** 2).mean()) < 5.0
     assert np.degrees(np.sqrt((off[:, 1:3] ** 2).mean(axis=0))).max() < 0.02
 
 
 def test_sigmas_are_as_large_as_the_errors_are() -> None:
     for own_m in (0.0, 10.0, 60.0):
-        found = [last(watched(Sky(seed, own_m), 120)) for seed in range(12)]
+        found = [last(watched(Sky(seed, own_m), 120)) for seed in range(6)]
         sigmas = np.array([(one.error[0] - [*ERROR, LATE_S]) / one.sigma[0] for one in found])
         assert np.sqrt((sigmas**2).mean()) < 1.4
         assert np.abs(sigmas).max() < 4.0
