@@ -8,7 +8,7 @@ from typing import Literal
 
 from gateway import associate, fuse, predict, track
 from gateway.align import SECOND, Fix
-from gateway.associate import Association
+from gateway.associate import Association, Spans
 from gateway.fuse import Lane, LifeChange
 from gateway.fuse.consistency import Finding
 from gateway.making import NAMED_AT_MOST
@@ -164,16 +164,21 @@ class Work(Tracking):
         self.association = after
         if after.ledger.spans == old.ledger.spans:
             return
-        self.lanes, jobs = fuse.reroute(self.lanes, known, self._scene())
-        self.jobs = {job.track: job for job in jobs}
-        self._settle()
+        self._reroute(known, self.now or 0)
         for change in (change for check in after.checks for change in check.changes if change not in self.reported):
             self.reported |= {change}
             self.changes.append(change)
             verb = "is" if change.kind == "associated" else "is no longer"
             self.events.append(Event(change.at, "info", f"{change.aircraft} {verb} radar track {change.radar_track}"))
-        self.lanes, ended = fuse.joined(self.lanes, self._spans, self.tracks, self.now or 0)
+
+    def _reroute(self, known: Spans, at: int) -> None:
+        """After pairs changed from what was known: plots move between system tracks, and radars' tracks join others."""
+        self.lanes, jobs = fuse.reroute(self.lanes, known, self._scene())
+        # Before the rows are written, which may be under the number of a track that joined.
+        self.lanes, ended = fuse.joined(self.lanes, self._spans, self.tracks, at)
         self.ended += ended
+        self.jobs = {job.track: job for job in jobs}
+        self._settle()
 
     def _join_radars(self, at: int) -> None:
         """Radar tracks of several radars that are one target, brought into one system track; and others out of it."""
@@ -189,11 +194,7 @@ class Work(Tracking):
         if done.lanes is not self.lanes:
             self.events += [Event(at, "info", text) for text in done.told]
             self.lanes = done.lanes
-            self.lanes, jobs = fuse.reroute(self.lanes, known, self._scene())
-            self.jobs = {job.track: job for job in jobs}
-            self._settle()
-            self.lanes, ended = fuse.joined(self.lanes, self._spans, self.tracks, at)
-            self.ended += ended
+            self._reroute(known, at)
         theirs = fuse.radar_tracks_of_aircraft(self.lanes, self._spans, seen.keys)
         self.of_radars.append(associate.combined(seen, theirs, allowed, self.frame))
 
@@ -273,6 +274,6 @@ class Work(Tracking):
         self._settle()
         if found.former is not None:
             self.tracks = self.tracks.closing(found.former, found.since)
-        self.lived.append(LifeChange(found.since, found.lane.track, "confirmed", found.reason()))
-        self.events.append(Event(found.since, "info", f"track {found.lane.track} goes on as {found.reason()}"))
+        self.lived.append(LifeChange(found.since, found.lane.number, "confirmed", found.reason()))
+        self.events.append(Event(found.since, "info", f"track {found.lane.number} goes on as {found.reason()}"))
         return True

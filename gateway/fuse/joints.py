@@ -179,9 +179,9 @@ def radar_tracks_of_aircraft(lanes: Lanes, spans: Spans, keys: Iterable[Key]) ->
     for key in keys:
         track = lanes.by_aircraft.get(spans.pairs.get(key, ""))
         if track is not None:
-            found.setdefault(track, []).append(key)
+            found.setdefault(lanes.lanes[track].number, []).append(key)
     return found
 
 
 def _who(lane: Lane) -> str:
-    return f"track {lane.track}" + (f", {lane.aircraft}" if lane.aircraft else "")
+    return f"track {lane.number}" + (f", {lane.aircraft}" if lane.aircraft else "")

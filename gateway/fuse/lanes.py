@@ -13,6 +13,7 @@ from gateway.settings import Options
 from gateway.track import Key, RadarTracks, name_of
 
 _TRACK = "track "  # no aircraft's name has a space
+KNOWN_BEFORE_S = 10.0  # a radars' track that is older by more than this gives its number to the aircraft that it is
 EVENTS_AT_MOST = 1024  # of one track: a source of more than 100 measurements a second has a shorter history
 
 
@@ -30,11 +31,27 @@ class Lane:
     emptied_at: int = 0  # when its past was forgotten
     origin: str = ""  # how it began, for people
     told: str = ""  # the part of its life that was last told
+    began_at: int | None = None  # once that is forgotten
+    taken: tuple[tuple[int, int], ...] = ()  # numbers of radars' tracks that it goes on with: since when, and which
 
     @property
     def name(self) -> str:
         """What its radar tracks are said to be: its aircraft, else the track itself."""
         return self.aircraft or f"{_TRACK}{self.track}"
+
+    @property
+    def number(self) -> int:
+        """What people know it by now."""
+        return self.taken[-1][1] if self.taken else self.track
+
+    def number_at(self, at: int) -> int:
+        """What people know it by at an instant."""
+        return next((number for since, number in reversed(self.taken) if at >= since), self.track)
+
+    @property
+    def began(self) -> int:
+        """When its first state was; only of a lane with events."""
+        return self.events[0].at if self.began_at is None else self.began_at
 
     @property
     def last(self) -> Event:
@@ -43,8 +60,9 @@ class Lane:
 
     def with_events(self, events: tuple[Event, ...]) -> Lane:
         """The same with another past. Written out: on the hot path `dataclasses.replace` would cost four times this."""
-        whole = self.whole
+        whole, began_at = self.whole, self.began_at
         if len(events) > EVENTS_AT_MOST:
+            began_at = events[0].at if began_at is None else began_at
             events, whole = events[-EVENTS_AT_MOST:], False
         return Lane(
             self.track,
@@ -57,6 +75,8 @@ class Lane:
             self.emptied_at,
             self.origin,
             self.told,
+            began_at,
+            self.taken,
         )
 
     def coasting_at(self, at: int, options: Options) -> bool:
@@ -73,6 +93,7 @@ class Ended:
     track: int
     reason: str
     quiet: bool = False
+    into: int | None = None  # the track that it joined
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +105,12 @@ class Gone:
     ended_at: int
     enu_m: tuple[float, ...]  # (3,) where that was
     event: Event | None  # that state; forgotten when no late data can go on from it any more
+    taken: tuple[tuple[int, int], ...] = ()  # see `Lane.taken`
+
+    @property
+    def number(self) -> int:
+        """What people knew it by."""
+        return self.taken[-1][1] if self.taken else self.track
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +155,13 @@ class Lanes:
         track = int(name.removeprefix(_TRACK))
         return track if track in self.lanes else None
 
+    def numbered(self, number: int) -> Lane:
+        """The track that people know by a number now."""
+        known = self.lanes.get(number)
+        if known is not None and known.number == number and known.ended_at is None:
+            return known
+        return next(lane for lane in self.lanes.values() if lane.number == number and lane.ended_at is None)
+
     def with_lane(self, lane: Lane) -> Lanes:
         """The same with one lane put in place of its former self."""
         return self.with_lanes({lane.track: lane})
@@ -169,7 +203,7 @@ class Lanes:
         for track, lane in self.lanes.items():
             if len(lane.events) > 1 and lane.events[1].at < before:
                 keep = max(bisect_left(lane.events, before, key=lambda event: event.at) - 1, 0)
-                changed[track] = replace(lane, events=lane.events[keep:], whole=False)
+                changed[track] = replace(lane, events=lane.events[keep:], whole=False, began_at=lane.began)
         return self.with_lanes(changed) if changed else self
 
 
@@ -195,28 +229,58 @@ def joined(lanes: Lanes, spans: Spans, tracks: RadarTracks, at: int) -> tuple[La
         if lane.key is None:
             continue
         to = joined_at(lane, spans, hosted.get(lane.name, ()), tracks, at)
-        if to is not None and lane.ended_at is None:
-            track, who = lanes.track_of(to[1]) or 0, lanes.by_aircraft.get(to[1])
-            same = "the same target" if who is None else to[1]
-            ended.append(Ended(to[0], lane.track, f"joined track {track}, {same}"))
-        if (to[0] if to else None) != lane.ended_at:
-            lanes = lanes.with_lane(replace(lane, ended_at=to[0] if to else None))
+        if (to[0] if to else None) == lane.ended_at:
+            continue
+        lanes = _with_number(lanes, lane, None)
+        if to is not None:
+            host = lanes.lanes[lanes.track_of(to[1]) or 0]
+            former = host.number
+            lanes = _with_number(lanes, lane, (to[0], host))
+            stays = lanes.lanes[host.track].number
+            if lane.ended_at is None:
+                gone = former if stays == lane.number else lane.number
+                same = to[1] if to[1] in lanes.by_aircraft else "the same target"
+                ended.append(Ended(to[0], gone, f"joined track {stays}, {same}", into=stays))
+        lanes = lanes.with_lane(replace(lane, ended_at=to[0] if to else None))
     return lanes, ended
+
+
+def _with_number(lanes: Lanes, lane: Lane, to: tuple[int, Lane] | None) -> Lanes:
+    """The lanes where the track that a radars' track joined goes on under its number, if that was known long before.
+
+    `to`: since when, and which track; None: where it did in hindsight not join, the number is given back.
+    """
+    if to is None:
+        holders = [one for one in lanes.lanes.values() if any(number == lane.number for _, number in one.taken)]
+        for one in holders:
+            if one.track != lane.track:
+                kept = tuple(entry for entry in one.taken if entry[1] != lane.number)
+                lanes = lanes.with_lane(replace(one, taken=kept))
+        return lanes
+    since, host = to
+    is_known = bool(host.events and lane.events) and host.began - lane.began > int(KNOWN_BEFORE_S * SECOND)
+    if not is_known or lane.number > host.number:
+        return lanes
+    return lanes.with_lane(replace(host, taken=(*host.taken, (since, lane.number))))
 
 
 def emptied(lanes: Lanes, at: int) -> tuple[Lanes, list[Ended]]:
     """The aircraft's lanes without their past, under their numbers; radar tracks' lanes end."""
     kept = {
-        track: replace(lane, events=(), whole=True, emptied_at=at)
+        track: replace(lane, events=(), whole=True, emptied_at=at, began_at=None, taken=_from_the_start(lane))
         for track, lane in lanes.lanes.items()
         if lane.key is None and lane.ended_at is None
     }
     ended = [
-        Ended(at, track, "the session's time was set back")
-        for track, lane in lanes.lanes.items()
+        Ended(at, lane.number, "the session's time was set back")
+        for lane in lanes.lanes.values()
         if lane.key is not None and lane.ended_at is None
     ]
     return replace(lanes, lanes=kept, by_key={}, gone={}, adopted=(), joints=()), ended
+
+
+def _from_the_start(lane: Lane) -> tuple[tuple[int, int], ...]:
+    return ((0, lane.number),) if lane.taken else ()
 
 
 def joined_at(

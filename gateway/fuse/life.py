@@ -57,14 +57,14 @@ def told(lanes: Lanes, at: int, options: Options) -> tuple[Lanes, list[LifeChang
         if life == lane.told:
             continue
         if not lane.told:
-            changes.append(LifeChange(lane.events[0].at, lane.track, "tentative", lane.origin))
+            changes.append(LifeChange(lane.events[0].at, lane.number, "tentative", lane.origin))
         if life == "confirmed":
             changes.append(_confirmed(lane))
         elif life == "coasting":
             silence_s = (at - lane.last.at) / SECOND
-            changes.append(LifeChange(at, lane.track, life, f"nothing for {silence_s:.0f} s"))
+            changes.append(LifeChange(at, lane.number, life, f"nothing for {silence_s:.0f} s"))
         elif lane.told:
-            changes.append(LifeChange(at, lane.track, life, "in hindsight its measurements do not agree"))
+            changes.append(LifeChange(at, lane.number, life, "in hindsight its measurements do not agree"))
         changed[lane.track] = replace(lane, told=life)
     return (lanes.with_lanes(changed) if changed else lanes), changes
 
@@ -73,14 +73,14 @@ def _confirmed(lane: Lane) -> LifeChange:
     """Confirmed for the first time, or heard again."""
     if lane.told == "coasting":
         gap_s = max((b.at - a.at for a, b in zip(lane.events, lane.events[1:], strict=False)), default=0) / SECOND
-        return LifeChange(lane.last.at, lane.track, "confirmed", f"heard again after {gap_s:.0f} s")
+        return LifeChange(lane.last.at, lane.number, "confirmed", f"heard again after {gap_s:.0f} s")
     first = next(event for event in lane.events if event.score == CONFIRMED)
-    return LifeChange(first.at, lane.track, "confirmed", "its measurements agree")
+    return LifeChange(first.at, lane.number, "confirmed", "its measurements agree")
 
 
 def sentence(change: LifeChange, lanes: Lanes) -> str | None:
     """What the log says of a change; nothing of a track that has just begun, unless it was one before."""
-    lane = lanes.lanes[change.track]
+    lane = lanes.numbered(change.track)
     who = lane.aircraft or (f"radar track {name_of(lane.key)}" if lane.key else "")
     if change.life == "tentative":
         return f"track {change.track} is {change.reason}" if "again" in change.reason else None
@@ -102,10 +102,11 @@ def end_silent(lanes: Lanes, at: int, options: Options) -> tuple[Lanes, list[End
         if at - (lane.last.at if lane.events else lane.emptied_at) > int(limit_s * SECOND):
             out.append(lane.track)
             never = ", and it was never confirmed" if is_tentative else ""
-            ended.append(Ended(at, lane.track, f"no data for {limit_s:.0f} s{never}", is_tentative))
+            ended.append(Ended(at, lane.number, f"no data for {limit_s:.0f} s{never}", is_tentative))
             if lane.aircraft is not None and lane.events:
                 last = lane.last
-                gone[lane.aircraft] = Gone(lane.track, last.at, at, tuple(last.mean[POSITION].tolist()), last)
+                place = tuple(last.mean[POSITION].tolist())
+                gone[lane.aircraft] = Gone(lane.track, last.at, at, place, last, lane.taken)
     if out:
         lanes = lanes.without(out)
     if gone or lanes.gone:
@@ -141,11 +142,13 @@ def lane_of_report(lanes: Lanes, fix: Fix, options: Options) -> tuple[Lanes, Lan
         if fix.at < known.at:
             return lanes, None
         life = "coasting" if known.event.score == CONFIRMED else "tentative"
-        lane = Lane(known.track, fix.aircraft, None, 0, (known.event,), False, origin=back, told=life)
+        lane = Lane(
+            known.track, fix.aircraft, None, 0, (known.event,), False, origin=back, told=life, taken=known.taken
+        )
     elif silence_s <= options.returns_within_s and _is_within_reach(known, fix, silence_s):
-        lane = Lane(known.track, fix.aircraft, None, 0, origin=back)
+        lane = Lane(known.track, fix.aircraft, None, 0, origin=back, taken=known.taken)
     else:
-        return lanes.begun(fix.aircraft, None, 0, f"{fix.aircraft} again, which was track {known.track}")
+        return lanes.begun(fix.aircraft, None, 0, f"{fix.aircraft} again, which was track {known.number}")
     return lanes.added(lane), lane
 
 

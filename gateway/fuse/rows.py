@@ -88,7 +88,7 @@ def row_of(lane: Lane, event: Event, spans: Spans, separation_m: float, model: M
     return Row(
         event.at,
         received,
-        lane.track,
+        lane.number_at(event.at),
         lane.aircraft,
         names,
         by,
@@ -113,7 +113,7 @@ def work(
         lane = lanes.lanes[job.track]
         changed[lane.track] = lane.with_events((*lane.events, *events))
         rows += [row_of(lane, event, spans, separation_m, model) for event in events]
-        fresh += [(job.track, event) for event in events if event.measure.serial == job.fresh]
+        fresh += [(lane.number, event) for event in events if event.measure.serial == job.fresh]
     return lanes.with_lanes(changed), rows, fresh
 
 
@@ -127,7 +127,7 @@ def coast(lanes: Sequence[Lane], at: int, spans: Spans, separation_m: float, mod
         Row(
             at,
             -1,
-            lane.track,
+            lane.number,
             lane.aircraft,
             radar_names(lane, spans, at),
             "coast",

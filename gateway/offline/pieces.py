@@ -8,7 +8,7 @@ gateway's history holds, so memory does not grow with the session.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 from typing import Any
 
@@ -57,6 +57,7 @@ class _Past:
     last: Event | None = None  # the last that is in a piece
     now: tuple[int, Estimate | Mixture] | None = None  # when and what the last state in a piece is, coasting included
     over_at: int | None = None
+    begun: set[int] = field(default_factory=set)  # when another filter than before went on with the track
 
 
 class Pieces:
@@ -91,6 +92,8 @@ class Pieces:
         for one in settled:
             past = self._pasts.setdefault(one.track, _Past([]))
             newest = past.events[-1] if past.events else past.last
+            if past.over_at is not None and one.events[0] is not newest:
+                past.begun.add(one.events[0].at)
             past.events += one.events[1:] if one.events[0] is newest else one.events
             past.over_at = self._now if one.over else None
             self._waiting += len(one.events)
@@ -134,7 +137,7 @@ class Pieces:
             row for time, row in last_of.items() if rows.updated_by[row] == "coast" and (with_tail or time < until)
         ]
         settled = {event.at: event for event in past.events}
-        begun = {event.at for event in past.events if _begins(event)}
+        begun = {event.at for event in past.events if _begins(event)} | past.begun
         found, states, begins = [], [], []
         for time, row in _in_order(past.events, coasted, last_of, rows.time):
             event = settled.get(time)
@@ -147,7 +150,7 @@ class Pieces:
             begins.append(event is not None and time in begun)
         waits = mine[rows.time[mine] > until] if not with_tail else mine[:0]
         if past.events:
-            past.last, past.events = past.events[-1], []
+            past.last, past.events, past.begun = past.events[-1], [], set()
         if not found:
             return [], waits
         at = np.array(found)

@@ -386,25 +386,27 @@ def test_an_ended_tracks_number_is_not_used_again(world: Any) -> None:
     assert {row["aircraft"] for row in ran.rows()} == {ONE}
 
 
-def test_a_radar_track_alone_is_a_track_and_joins_the_aircrafts(world: Any) -> None:
-    """Radar first, GPS later: one track of the radar's, one of the aircraft's, whose the plots are from the join on."""
+def test_a_radar_track_alone_is_a_track_and_becomes_the_aircrafts(world: Any) -> None:
+    """Radar first, GPS later: the aircraft's track, with the plots in it, goes on under the number that was there first."""
     flight = [one for one in world.flight(seconds=50.0) if isinstance(one, RadarPlot) or one.valid_at > world.at(20.0)]
     ran = world.run(flight)
-    alone, joined = ran.rows(radar_track="1/3", aircraft=None), ran.rows(aircraft=ONE)
+    alone, theirs = ran.rows(radar_track="1/3", aircraft=None), ran.rows(aircraft=ONE)
+    joined_at = world.at(30.13)
     assert {row["track"] for row in alone} == {1}
-    assert {row["track"] for row in joined} == {2}
+    assert {row["track"] for row in theirs if row["time"] < joined_at} == {2}
+    joined = [row for row in theirs if row["track"] == 1]
+    assert min(row["time"] for row in joined) == joined_at
     assert {row["state"] for row in alone} == {"radar only"}
     assert alone[0]["time"] < world.at(3.0)
     (ended,) = ran.ended
-    assert (ended.track, ended.at) == (1, world.at(30.13))
-    assert "joined track 2" in ended.reason
+    assert (ended.track, ended.at, ended.into) == (2, joined_at, 1)
+    assert "joined track 1" in ended.reason
     assert max(row["time"] for row in alone) <= world.at(31.13)  # what was written until the check was done
     later = [row for row in joined if row["updated_by"] == "radar"]
-    assert min(row["time"] for row in later) > world.at(30.13)
     assert {row["radar_track"] for row in later} == {"1/3"}
     assert {row["state"] for row in later} == {"fused"}
-    # a track that joined coasts no more and is ended once
-    assert not [row for row in world.run(flight, until_s=90.0).rows(track=1) if row["updated_by"] == "coast"]
+    # a number that joined coasts no more and is ended once
+    assert max(row["time"] for row in world.run(flight, until_s=90.0).rows(track=2)) < joined_at
 
 
 def test_two_radars_behind_one_aircraft_are_both_named(world: Any) -> None:
@@ -445,7 +447,7 @@ def test_a_rows_coordinates_are_one_place(world: Any) -> None:
 
 
 def test_predictions_are_made_each_second_for_every_track(world: Any) -> None:
-    """At whole seconds each living track is carried on to 10, 30 and 60 s, less and less certain."""
+    """At whole seconds each living track is carried on to 10, 30 and 60 s, along its way less and less certain."""
     ran = world.run(world.flight(seconds=20.0))
     made = [int(at) for picture in ran.pictures for at in picture.predict.made]
     assert all(at % world.SECOND == 0 for at in made)
@@ -454,7 +456,7 @@ def test_predictions_are_made_each_second_for_every_track(world: Any) -> None:
     table = picture.predict
     assert ((table.valid - table.made) / 1e9).tolist() == table.horizon_s.tolist()
     assert table.horizon_s[:3].tolist() == [10.0, 30.0, 60.0]
-    assert (np.diff(table.sigma_m.reshape(-1, 3), axis=1) > 0.0).all()
+    assert (np.diff(table.sigma_along_m.reshape(-1, 3), axis=1) > 0.0).all()
     last = len(table.made) - 3
     course = world.Course()
     there = course.at((int(table.valid[last]) - world.START) / 1e9)

@@ -279,11 +279,16 @@ def test_when_the_position_source_is_lost_the_radars_track_remains() -> None:
 
 
 def test_a_position_source_that_appears_is_associated_to_the_joined_track() -> None:
-    """Both radars' tracks go over together: from the instant of association on there is one track."""
-    flown = fly(scene_of(ONE, 45.0), without_gps(0.0, 20.0))
+    """Both radars' tracks become the aircraft's, which goes on under the number that people have known them by."""
+    flown = fly(scene_of(ONE, 60.0), both(without_gps(0.0, 20.0), without_gps(40.0)))
     assert {row.radar_track for row in flown.of(1, PAIRED_WITHIN_S, 20.0)} == {"1/1 2/101"}
-    assert {(row.aircraft, row.radar_track) for row in flown.since(27.0)} == {("mavlink:1", "1/1 2/101")}
-    assert len(numbers(flown.since(27.0))) == 1
+    assert any("joined track 1, mavlink:1" in one.reason for picture in flown.pictures for one in picture.fuse.ended)
+    late = flown.since(27.0)
+    assert numbers(late) == {1}
+    assert {(row.aircraft, row.radar_track) for row in late} == {("mavlink:1", "1/1 2/101")}
+    assert {row.state for row in late if row.at > 51.0} == {"radar only"}
+    predicted = np.concatenate([one.predict.track[one.predict.made > START_NS + 27 * SECOND] for one in flown.pictures])
+    assert set(predicted.tolist()) == {1}
 
 
 def test_ticks_change_nothing_of_it() -> None:

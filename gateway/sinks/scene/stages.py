@@ -106,8 +106,11 @@ class StageScene:
                 log.append((ended.at, picture.step, text, "info"))
             gone = max(ended.at, picture.now, newest(ended.track))  # the last rows can be newer than the reason to end
             paths = [entity(root, ended.track) for root in ("fuse", "predict", "approach")]
-            others = {name for track, names in self._sources.items() if track != ended.track for name in names}
-            for name in sorted(self._sources.pop(ended.track, set()) - others):
+            mine = self._sources.pop(ended.track, set())
+            if ended.into is not None:  # its sources go on there
+                self._sources.setdefault(ended.into, set()).update(mine)
+            others = {name for names in self._sources.values() for name in names}
+            for name in sorted(mine - others):
                 paths += [raw_path(name), entity("associate", "point", name)]
             clear = [once(path, gone, picture.step, rr.Clear.columns(is_recursive=[True])) for path in paths]
             state = rr.StateChange.columns(state=["ended"])

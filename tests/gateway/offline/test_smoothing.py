@@ -106,16 +106,22 @@ def test_every_state_settles_once(world: Any) -> None:
 
 
 def test_a_plot_that_became_another_tracks_is_not_in_two(world: Any) -> None:
-    """A radar track joins an aircraft in hindsight: what it wrote since then for itself is in no piece."""
+    """A radar track becomes an aircraft's in hindsight: its number has the one's states before and the other's after."""
     flight = [
         one for one in world.flight(seconds=45.0) if not isinstance(one, GpsReport) or one.valid_at > world.at(20.0)
     ]
     ran = world.run(flight, ticks="20 ms")
-    (alone, aircraft) = gathered(world, ran)
+    (both, reports) = gathered(world, ran)
     since = ran.ended[0].at
-    assert max(int(time) for _, time in rows_of(alone)) < since
-    assert not {time for _, time in rows_of(alone)} & {time for _, time in rows_of(aircraft)}
-    assert [key for key in last_rows(ran) if key[0] == 1 and key[1] >= since]  # rows that there were
+    assert max(int(time) for _, time in rows_of(reports)) < since
+    known = [
+        (int(time), name, bool(begins))
+        for piece in both
+        for time, name, begins in zip(piece.rows.time, piece.rows.aircraft, piece.begins, strict=True)
+    ]
+    assert all((name is None) == (time < since) for time, name, _ in known)
+    assert [time for time, _, begins in known if begins] == [known[0][0], since]
+    assert any(row["time"] >= since for row in ran.rows(track=1, aircraft=None))  # rows that there were
 
 
 def test_tracks_that_ended_are_forgotten(world: Any) -> None:
