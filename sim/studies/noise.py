@@ -127,7 +127,7 @@ def sessions(
         ]
         events = iter(filtered([Job(0, None, one, lambda fix: None) for each in tracks for one in each], model))
         for each in tracks:
-            yield _heard(list(itertools.islice(events, len(each))), position, radars)
+            yield listened(list(itertools.islice(events, len(each))), position, radars)
 
 
 def _changed(scene: Scene, part: str, times: float) -> Scene:
@@ -188,8 +188,8 @@ def _measured(
     return sorted(found, key=lambda one: one.at)
 
 
-def _heard(tracks: Sequence[list[Event]], position: PositionSource, radars: dict[int, RadarSite]) -> Heard:
-    """A session, second by second."""
+def listened(tracks: Sequence[list[Event]], position: PositionSource, radars: dict[int, RadarSite]) -> Heard:
+    """What comes of the events of some tracks, heard second by second."""
     told = sorted(((place, event) for place, one in enumerate(tracks) for event in one), key=lambda one: one[1].at)
     known, found, nearest = Consistency(), dict[str, float](), 0.0
     parts = [part.name for part in (*REPORT, *PLOT)]
