@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 
 from gateway.align import SECOND
 from gateway.associate import Span, Spans, aircraft_of, ordinal_of
-from gateway.fuse.lanes import Joint, Lane, Lanes, is_alive
+from gateway.fuse.becoming import is_alive
+from gateway.fuse.lanes import Joint, Lane, Lanes
 from gateway.track import Key, RadarTracks, name_of
 
 SEEN_WITHIN_S = 10.0  # a position source that was heard this lately speaks for itself
