@@ -209,4 +209,5 @@ def _weights(pairs: Pairs, solution: Solution | None) -> Floats:
     left, variance = solution.left(pairs)
     distance = np.abs(np.nan_to_num(left)) / np.sqrt(variance)
     less = np.where(distance > HUBER, HUBER / np.maximum(distance, HUBER), 1.0)
-    return weight * less * (distance <= WRONG).all(axis=1)[:, None]
+    is_right = np.all(distance <= WRONG, axis=1, keepdims=True)
+    return np.asarray(weight * less * is_right)

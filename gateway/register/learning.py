@@ -173,12 +173,12 @@ class Registration:
         own_m = usual_m if self.solution is None else self.solution.own_sigma_m
         evidence = folded(self.evidence, at - FOLDED_AFTER_NS, own_m)
         past = against_past(evidence, own_m, common_m) if evidence.links else {}
-        doubted = frozenset(radar for radar, chi_square in past.items() if chi_square > PAST_CHI_SQUARE)
+        doubted = frozenset(number for number, chi_square in past.items() if chi_square > PAST_CHI_SQUARE)
         given_up, said = self, list[Said]()
-        for radar in sorted(doubted & self.doubted & radars.keys()):
-            evidence = without_past(evidence, radar)
-            given_up, told = given_up._unlearnt(radars[radar])
-            said.append(told)
+        for number in sorted(doubted & self.doubted & radars.keys()):
+            evidence = without_past(evidence, number)
+            given_up, warning = given_up._unlearnt(radars[number])
+            said.append(warning)
         solution = solved(evidence, usual_m, common_m, given_up.solution)
         if solution is None:
             return replace(given_up, evidence=evidence, solution=None, is_new=False), said
