@@ -52,6 +52,7 @@ class Making:
         self.jobs: dict[int, Job] = {}
         self._both: tuple[Spans, tuple[Adopted, ...], tuple[Joint, ...], Spans] = (Spans(), (), (), Spans())
         self.untracked = 0
+        self.looks: list[track.Look] = []
 
     def _work_in(self, lanes: Lanes, job: Job | None) -> None:
         """A job, to be worked together with those of other tracks."""
@@ -141,7 +142,7 @@ class Making:
             now=self.now or 0,
             observations=observations,
             align=align.draw(self.fixes, self.plots, self.frame, self.radar_frames),
-            track=track.table(self.tracks, self.untracked),
+            track=track.table(self.tracks, self.untracked, self.looks),
             associate=associate.table(self.checks, self.association.ledger, self.changes, self.of_radars),
             register=register.table(self.registration, self.radars, self.now or 0, self.residuals),
             fuse=replace(table, settled=tuple(self.settled)),

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from gateway.align import SECOND, Plot
 from gateway.arriving import Arriving
-from gateway.track import Key
+from gateway.track import Key, look_of
 
 PERIOD_TOLD_WITHIN_S = 20.0  # radars say it every few seconds
 
@@ -55,7 +55,12 @@ class Tracking(Arriving):
 
     def due_tracks(self) -> tuple[Tracked, Tracked]:
         """What was due of the unnumbered plots: those that are told of a radar track, and those that are taken back."""
+        before = self.unnumbered.watches
         self.unnumbered, taken = self.unnumbered.worked(self.now or 0, self.radars, self.options)
+        for radar, watch in self.unnumbered.watches.items():
+            if watch is not before[radar]:
+                told = [plot for plot in taken.told if plot.radar == radar]
+                self.looks.append(look_of(watch, radar, told, self.radar_frames[radar], self.frame))
         for radar in taken.crowded:
             self.count("scans of which not every plot could be followed")
             self._say_crowded(radar)
@@ -65,11 +70,11 @@ class Tracking(Arriving):
             self.tracks, key = self.tracks.without(plot)
             if key is not None:
                 back.append((plot, key))
-        told: Tracked = []
+        given: Tracked = []
         for plot in taken.told:
             if self.tracks.has_room(plot):
                 self.tracks, key = self.tracks.after(plot)
-                told.append((plot, key))
+                given.append((plot, key))
             else:
                 self.untracked += 1
-        return told, back
+        return given, back

@@ -15,6 +15,7 @@ from gateway.settings import Site
 from gateway.sinks.blueprint import blueprint
 from gateway.sinks.feed import FileFeed, Identity, ServedFeed
 from gateway.sinks.recording import optimise
+from gateway.sinks.scene.clutter import ClutterScene
 from gateway.sinks.scene.entry import Entry, made
 from gateway.sinks.scene.flown import Flights
 from gateway.sinks.scene.health import HealthScene
@@ -74,6 +75,7 @@ class RerunSink:
         self._approach, self._predict, self._stages = ApproachScene(site), PredictScene(site), StageScene(site)
         self._scope, self._health, self._plans = ScopeScene(site), HealthScene(), PlanScene(site)
         self._smoothed, self._register, self._radars = SmoothedScene(site), RegisterScene(site), MultiRadarScene(site)
+        self._clutter = ClutterScene()
         self._period_ns, self._rows_limit = round(period_s * 1e9), rows_limit
         self._rest_ns = self._period_ns
         self._waiting: list[Picture] = []
@@ -149,6 +151,7 @@ class RerunSink:
             *self._sources.entries(pictures, heard),
             *self._scope.entries(heard, flights),
             *self._radars.entries(pictures),
+            *self._clutter.entries(pictures),
             *self._tracks.entries(flights),
             *self._approach.entries(flights),
             *self._predict.entries(pictures, flights),

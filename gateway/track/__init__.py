@@ -1,5 +1,6 @@
 """Track: which plots belong together. The radar's own numbers decide; plots without one become tracks by `unnumbered`."""
 
+from gateway.track.looks import Look, look_of
 from gateway.track.numbered import (
     FIRST_OWN,
     GREATEST_SPEED_MPS,
@@ -21,12 +22,14 @@ __all__ = [
     "PLOTS_AT_MOST",
     "TRACKS_AT_MOST",
     "Key",
+    "Look",
     "Number",
     "Place",
     "RadarTracks",
     "Taken",
     "Tracked",
     "Unnumbered",
+    "look_of",
     "name_of",
     "table",
 ]

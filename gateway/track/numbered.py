@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 from gateway.align import SECOND, Plot
+
+if TYPE_CHECKING:
+    from gateway.track.looks import Look
 
 GREATEST_SPEED_MPS = 600.0  # beyond any aircraft that a landing radar meets
 GREATEST_SILENCE_S = 10.0
@@ -26,10 +30,11 @@ Number = tuple[int, int]  # radar, number
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """The radar tracks that are alive, and how many plots of this step no track took."""
+    """The radar tracks that are alive, how many plots of this step no track took, and what unnumbered ones may be."""
 
     active: tuple[str, ...]  # "1/3": radar 1, track 3
     untracked: int
+    looks: tuple[Look, ...] = ()  # scans of unnumbered plots that were worked in this step
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,9 +159,9 @@ class RadarTracks:
         )
 
 
-def table(tracks: RadarTracks, untracked: int) -> Tracked:
-    """The radar tracks alive, by name."""
-    return Tracked(tuple(sorted({name_of(key) for key in tracks.plots})), untracked)
+def table(tracks: RadarTracks, untracked: int, looks: Sequence[Look] = ()) -> Tracked:
+    """The radar tracks alive, by name, and what else the step found."""
+    return Tracked(tuple(sorted({name_of(key) for key in tracks.plots})), untracked, tuple(looks))
 
 
 @lru_cache(maxsize=4096)

@@ -108,9 +108,10 @@ class SourceScene:
         for name, start, end in sheaf.cuts():
             path, mine = path_of(name), slice(start, end)
             if self._drawn.is_new(path, int(sheaf.time[end - 1])):
-                self._trails[path] = Trail(path, kind, colour, 1.0 if line else 0.8)
-                look = rr.Points3D.from_fields(colors=colour, radii=style.points(2.0 if line else 3.5))
-                ground = rr.GeoPoints.from_fields(colors=colour, radii=style.points(2.0 if line else 3.0))
+                shade = style.UNNUMBERED if name.endswith("/0") else colour
+                self._trails[path] = Trail(path, kind, shade, 1.0 if line else 0.8)
+                look = rr.Points3D.from_fields(colors=shade, radii=style.points(2.0 if line else 3.5))
+                ground = rr.GeoPoints.from_fields(colors=shade, radii=style.points(2.0 if line else 3.0))
                 entries.append(Always(path, (look, ground)))
             extended.append((self._trails[path], sheaf.time[mine], sheaf.step[mine], place[mine], lat_lon[mine]))
         here = sheaf.rows(path_of, columns.points_3d(place), columns.points_on_map(lat_lon))

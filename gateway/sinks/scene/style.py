@@ -11,6 +11,7 @@ Colour = tuple[int, int, int] | tuple[int, int, int, int]
 # The three tracks of paper 003's figure 6.
 GPS: Colour = (255, 150, 30)
 RADAR: Colour = (60, 140, 255)
+UNNUMBERED: Colour = (45, 75, 115)  # plots that the radar did not number: dim, what a track takes of them stands out
 FUSED: Colour = (235, 50, 50)
 SMOOTHED: Colour = (90, 235, 235)  # what later measurements made of it
 

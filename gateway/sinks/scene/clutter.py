@@ -1,0 +1,82 @@
+"""Plots that the radar did not number: hypotheses fade with their likelihood, confirmed tracks stand out: /track."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from gateway.picture import Picture
+from gateway.sinks.scene import style
+from gateway.sinks.scene.entry import Always, Entry, entity, rows
+from gateway.track import Look
+
+Floats = NDArray[np.float64]
+
+FAINTEST, STRONGEST = 24.0, 200.0  # of 255: a hypothesis of likelihood 0, and of 1
+
+
+class ClutterScene:
+    """Draws what is thought of unnumbered plots; remembers which radars were drawn before."""
+
+    def __init__(self) -> None:
+        self._known: set[int] = set()
+
+    def entries(self, pictures: Sequence[Picture]) -> list[Entry]:
+        """What these pictures add, radar by radar, in order of time."""
+        looks: dict[int, list[tuple[Look, int]]] = {}
+        for picture in pictures:
+            for look in picture.track.looks:
+                looks.setdefault(look.radar, []).append((look, picture.step))
+        found: list[Entry] = []
+        for radar, some in looks.items():
+            some.sort(key=lambda one: one[0].at)
+            if radar not in self._known:
+                self._known.add(radar)
+                found += self._looks(radar)
+            found += _drawn(radar, some)
+        return found
+
+    def _looks(self, radar: int) -> list[Entry]:
+        """How they look at all times."""
+        colour = style.radar_colour(radar)
+        told = rr.Points3D.from_fields(colors=style.FUSED, radii=style.points(5.0), show_labels=True)
+        return [
+            Always(_path(radar, "hypotheses"), (rr.Points3D.from_fields(radii=style.points(2.5)),)),
+            Always(_path(radar, "confirmed"), (told,)),
+            Always(_path(radar, "taken"), (rr.Points3D.from_fields(colors=colour, radii=style.points(3.0)),)),
+        ]
+
+
+def _path(radar: int, what: str) -> str:
+    return entity("track", radar, what)
+
+
+def _drawn(radar: int, looks: Sequence[tuple[Look, int]]) -> list[Entry]:
+    time, step = [look.at for look, _ in looks], [number for _, number in looks]
+    red, green, blue = style.radar_colour(radar)[:3]
+    hypotheses, alphas, confirmed, labels, taken = [], [], [], [], []
+    for look, _ in looks:
+        told = np.array([bool(name) for name in look.track], dtype=np.bool_)
+        hypotheses.append(look.runway_m[~told])
+        alphas.append(FAINTEST + (STRONGEST - FAINTEST) * look.likelihood[~told])
+        confirmed.append(look.runway_m[told])
+        labels.append([name for name in look.track if name])
+        taken.append(look.taken_m[np.isfinite(look.taken_m).all(axis=1)])
+    shade = np.concatenate(alphas).astype(np.uint32)
+    colours = np.uint32(red << 24 | green << 16 | blue << 8) | shade
+    faint = rr.Points3D.columns(positions=np.concatenate(hypotheses), colors=colours).partition(_lengths(hypotheses))
+    named = [name for some in labels for name in some]
+    bright = rr.Points3D.columns(positions=np.concatenate(confirmed), labels=named).partition(_lengths(confirmed))
+    plots = rr.Points3D.columns(positions=np.concatenate(taken)).partition(_lengths(taken))
+    return [
+        rows(_path(radar, "hypotheses"), time, step, faint),
+        rows(_path(radar, "confirmed"), time, step, bright),
+        rows(_path(radar, "taken"), time, step, plots),
+    ]
+
+
+def _lengths(parts: Sequence[Floats]) -> list[int]:
+    return [len(part) for part in parts]

@@ -1,0 +1,61 @@
+"""Unnumbered plots in the viewer: hypotheses fade with their likelihood, confirmed tracks stand out, taken plots are marked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gateway.picture import Picture
+from gateway.sinks.scene.clutter import FAINTEST, STRONGEST, ClutterScene
+from gateway.sinks.scene.entry import Always, Rows
+from gateway.track import Look, Tracked
+
+
+def looked(picture: Picture, *looks: Look) -> Picture:
+    """The picture with scans of unnumbered plots."""
+    return replace(picture, track=Tracked((), 0, looks))
+
+
+def look(at: int, likelihood: list[float], track: tuple[str, ...]) -> Look:
+    """A scan of hypotheses in a row, and one plot that was taken, one that has no place."""
+    place = np.arange(3.0 * len(likelihood)).reshape(-1, 3)
+    return Look(1, at, place, np.array(likelihood), track, np.array([[1.0, 2.0, 3.0], [np.nan, 0.0, 0.0]]))
+
+
+def column(rows: Rows, name: str) -> list[Any]:
+    """A component's values, row by row."""
+    return next(one.as_arrow_array().to_pylist() for one in rows.columns if name in str(one.component_descriptor()))
+
+
+@pytest.fixture
+def picture(pictures: Callable[[float], list[Picture]]) -> Picture:
+    """Any."""
+    return pictures(1.0)[0]
+
+
+def drawn(picture: Picture) -> dict[str, Rows]:
+    """Rows by the last part of their path."""
+    scene = ClutterScene()
+    scans = [looked(picture, look(10, [0.9, 1.0, 0.0], ("1/100001", "", ""))), looked(picture, look(20, [0.5], ("",)))]
+    return {one.path.rpartition("/")[2]: one for one in scene.entries(scans) if not isinstance(one, Always)}
+
+
+def test_hypotheses_fade_with_their_likelihood(picture: Picture) -> None:
+    """The alpha of what is certain is the strongest, of what is impossible the faintest; confirmed tracks are not among them."""
+    colours = column(drawn(picture)["hypotheses"], "colors")
+    alphas = [[colour & 0xFF for colour in row] for row in colours]
+    assert alphas == [[int(STRONGEST), int(FAINTEST)], [int((STRONGEST + FAINTEST) / 2)]]
+
+
+def test_confirmed_tracks_have_their_names(picture: Picture) -> None:
+    """Each with its radar track beside it; in a scan without any, none."""
+    assert column(drawn(picture)["confirmed"], "labels") == [["1/100001"], []]
+
+
+def test_plots_that_were_taken_and_have_a_place_are_drawn(picture: Picture) -> None:
+    """One a scan here: the other has no place."""
+    assert [len(row) for row in column(drawn(picture)["taken"], "positions")] == [1, 1]
