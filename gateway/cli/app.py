@@ -9,7 +9,21 @@ from typing import Annotated, cast
 import typer
 
 from gateway import __version__
-from gateway.cli import check, columns, demo, live, play, reconstruct, register, replay, sessions, simulate, site, study
+from gateway.cli import (
+    check,
+    columns,
+    demo,
+    live,
+    play,
+    reconstruct,
+    register,
+    replay,
+    score,
+    sessions,
+    simulate,
+    site,
+    study,
+)
 from gateway.cli.failures import Failure
 
 app = typer.Typer(
@@ -21,7 +35,8 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (demo, live, replay, simulate, play, check, columns, register, reconstruct, site, study, sessions):
+_COMMANDS = (demo, live, replay, simulate, play, check, columns, register, reconstruct, score, site, study, sessions)
+for command in _COMMANDS:
     command.register(app)
 
 # click's UsageError, wherever this version of typer keeps its click

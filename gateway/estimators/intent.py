@@ -44,7 +44,7 @@ class Inference:
     regulation_sigma_s: float = 900.0  # of the time to go to a published or ordered point; eq 20
     plan_sigma_s: float = 170.0  # and to a planned one
     mean_turn: float = math.radians(60.0)  # what is left of a turn, on average, whatever was turned already
-    kept: float = 10.0  # how much more a point counts in a turn that it was flown at just before: most such turns are none
+    kept: float = 10.0  # how much more a point counts in a turn that it was flown at just before
 
     @classmethod
     def of(cls, rule: Rule) -> Inference:
