@@ -1,6 +1,6 @@
 """Frames that wait to be read side by side: inertial samples and air data, most of what comes in thick.
 
-They change nothing but what is shown of a vehicle. So they can be read after those that do change something, as long as it is
+They change nothing but what is shown of a vehicle (a wind tells predict something, and does not wait). So they can be read after those that do change something, as long as it is
 known what their senders' clocks had told when each came.
 """
 
@@ -35,8 +35,6 @@ _FAMILIES: Sequence[tuple[Reader, tuple[int, ...]]] = (
     (motion_columns.scaled_imu, (motion.RAW_IMU, motion.SCALED_IMU, motion.SCALED_IMU2, motion.SCALED_IMU3)),
     (air_columns.hud, (air.VFR_HUD,)),
     (air_columns.pressure, (air.SCALED_PRESSURE,)),
-    (air_columns.wind, (air.WIND,)),
-    (air_columns.wind_components, (air.WIND_COV,)),
 )
 _READ = tuple((reader, message) for reader, messages in _FAMILIES for message in messages)
 _ORDER = np.zeros(len(EXTRAS), np.int64)  # by message id: its place in _READ
