@@ -1,4 +1,4 @@
-"""What no stage of the picture reads (attitudes, inertial samples, air data), gathered: far the most of what comes in thick.
+"""What no stage of the picture reads (attitudes, inertial samples, air data but winds), gathered: far the most of what comes in thick.
 
 It goes to the sinks all the same. What is read by a stage is an arrival of its own, at its own instant; of what is not, it is
 enough to know what was said, and in which order.
@@ -20,7 +20,7 @@ Said = list[tuple[int, Heard]]
 PASSING = frozenset(
     (
         *(motion.ATTITUDE, motion.ATTITUDE_QUATERNION, motion.RAW_IMU, motion.SCALED_IMU, motion.SCALED_IMU2),
-        *(motion.SCALED_IMU3, motion.HIGHRES_IMU, air.VFR_HUD, air.SCALED_PRESSURE, air.WIND, air.WIND_COV),
+        *(motion.SCALED_IMU3, motion.HIGHRES_IMU, air.VFR_HUD, air.SCALED_PRESSURE),
     )
 )
 """The messages that say nothing else."""

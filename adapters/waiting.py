@@ -1,7 +1,7 @@
 """Frames that wait to be read side by side: inertial samples and air data, most of what comes in thick.
 
-They change nothing but what is shown of a vehicle (a wind tells predict something, and does not wait). So they can be read after those that do change something, as long as it is
-known what their senders' clocks had told when each came.
+They change nothing but what is shown of a vehicle. So they can be read after those that do change something, as long as it is
+known what their senders' clocks had told when each came. A wind does not wait: predictions depend on it.
 """
 
 from __future__ import annotations
