@@ -18,38 +18,37 @@ from adapters.air import (
     STRONGEST_MPS,
     shown_wind,
 )
+from adapters.moments import LEAST_UNIX_USEC
 from adapters.rows import Floats, Integers, Rows, Truths
 from gateway.observation import AirData, Many
+
+_HUD = ("airspeed", "groundspeed", "climb", "alt")
+_HUD_LEAST = np.array([[0.0], [0.0], [-FASTEST_MPS], [LOWEST_M]])
+_HUD_GREATEST = np.array([[FASTEST_MPS], [FASTEST_MPS], [FASTEST_MPS], [HIGHEST_M]])
+_HUD_SHOWN = ("airspeed, m/s", "ground speed, m/s", "climb, m/s", "altitude, m")
 
 
 def hud(rows: Rows, fields: Sequence[tuple[int, NDArray[Any]]]) -> Many:
     """VFR_HUD."""
     ((_, told),) = fields
-    columns = {
-        "airspeed_mps": rows.within(told["airspeed"], 0.0, FASTEST_MPS),
-        "groundspeed_mps": rows.within(told["groundspeed"], 0.0, FASTEST_MPS),
-        "climb_mps": rows.within(told["climb"], -FASTEST_MPS, FASTEST_MPS),
-        "altitude_msl_m": rows.within(told["alt"], LOWEST_M, HIGHEST_M),
-    }
-    names = ("airspeed, m/s", "ground speed, m/s", "climb, m/s", "altitude, m")
-    for name, values in zip(names, columns.values(), strict=True):
-        rows.show(name, values)
-    says = ~np.logical_and.reduce([np.isnan(values) for values in columns.values()])
-    return rows.many(AirData, says, rows.at_receipt(), **columns)
+    values = rows.within(np.array([told[name] for name in _HUD], np.float64), _HUD_LEAST, _HUD_GREATEST)
+    rows.show(_HUD_SHOWN, values)
+    says = ~np.logical_and.reduce(np.isnan(values))
+    names = ("airspeed_mps", "groundspeed_mps", "climb_mps", "altitude_msl_m")
+    return rows.many(AirData, says, rows.at_receipt(), **dict(zip(names, values, strict=True)))
 
 
 def pressure(rows: Rows, fields: Sequence[tuple[int, NDArray[Any]]]) -> Many:
     """SCALED_PRESSURE."""
     ((_, told),) = fields
-    static = rows.within(told["press_abs"], 1e-3, GREATEST_HPA)
-    pitot = rows.within(told["press_diff"], -GREATEST_HPA, GREATEST_HPA)
+    static = rows.within(told["press_abs"].astype(np.float64), 1e-3, GREATEST_HPA)
+    pitot = rows.within(told["press_diff"].astype(np.float64), -GREATEST_HPA, GREATEST_HPA)
     centidegrees = told["temperature"].astype(np.float64)
-    rows.show("static pressure, hPa", static)
-    rows.show("differential pressure, hPa", pitot)
-    rows.show("pressure sensor, degrees C", centidegrees / 100)
+    names = ("static pressure, hPa", "differential pressure, hPa", "pressure sensor, degrees C")
+    rows.show(names, np.array([static, pitot, centidegrees / 100]))
     return rows.many(
         AirData,
-        np.full(len(rows), fill_value=True),
+        np.ones(len(rows), np.bool_),
         rows.near(told["time_boot_ms"].astype(np.int64) * 1000),
         static_pressure_pa=static * 100,
         differential_pressure_pa=pitot * 100,
@@ -60,14 +59,13 @@ def pressure(rows: Rows, fields: Sequence[tuple[int, NDArray[Any]]]) -> Many:
 def wind(rows: Rows, fields: Sequence[tuple[int, NDArray[Any]]]) -> Many:
     """WIND."""
     ((_, told),) = fields
-    strength = rows.within(told["speed"], 0.0, STRONGEST_MPS)
-    bearing = rows.within(told["direction"], -360.0, 360.0)
-    down = rows.within(told["speed_z"], -STRONGEST_MPS, STRONGEST_MPS)
+    strength = rows.within(told["speed"].astype(np.float64), 0.0, STRONGEST_MPS)
+    bearing = rows.within(told["direction"].astype(np.float64), -360.0, 360.0)
+    down = rows.within(told["speed_z"].astype(np.float64), -STRONGEST_MPS, STRONGEST_MPS)
     says = ~np.isnan(strength + bearing)
     # One by one: NumPy's sines differ from the C library's in the last bit, and what is heard must not depend on with whom.
-    angles = [math.radians(one) if good else 0.0 for one, good in zip(bearing.tolist(), says.tolist(), strict=True)]
-    east = -strength * np.array([math.sin(angle) for angle in angles])
-    north = -strength * np.array([math.cos(angle) for angle in angles])
+    angles = list(map(math.radians, np.where(says, bearing, 0.0).tolist()))
+    east, north = -strength * np.array(list(map(math.sin, angles))), -strength * np.array(list(map(math.cos, angles)))
     return _wind(rows, says, rows.at_receipt(), east, north, down)
 
 
@@ -75,13 +73,15 @@ def wind_components(rows: Rows, fields: Sequence[tuple[int, NDArray[Any]]]) -> M
     """WIND_COV."""
     ((_, told),) = fields
     known = ~(np.isnan(told["wind_x"]) | np.isnan(told["wind_y"]))
-    rows, told = rows[known], told[known]
-    north = rows.within(told["wind_x"], -STRONGEST_MPS, STRONGEST_MPS)
-    east = rows.within(told["wind_y"], -STRONGEST_MPS, STRONGEST_MPS)
+    if not known.all():
+        rows, told = rows.saying(known), told[known]
+    north = rows.within(told["wind_x"].astype(np.float64), -STRONGEST_MPS, STRONGEST_MPS)
+    east = rows.within(told["wind_y"].astype(np.float64), -STRONGEST_MPS, STRONGEST_MPS)
     down = told["wind_z"].astype(np.float64)
     has_down = ~np.isnan(down)
     down[has_down] = rows[has_down].within(down[has_down], -STRONGEST_MPS, STRONGEST_MPS)
-    return _wind(rows, ~np.isnan(north + east), rows.near(told["time_usec"]), east, north, down)
+    usec = np.minimum(told["time_usec"], LEAST_UNIX_USEC).astype(np.int64)
+    return _wind(rows, ~np.isnan(north + east), rows.near(usec), east, north, down)
 
 
 def _wind(rows: Rows, says: Truths, valid_at: Integers, east: Floats, north: Floats, down: Floats) -> Many:

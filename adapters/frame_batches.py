@@ -62,7 +62,8 @@ def heads_of(datagrams: Sequence[bytes]) -> Heads:
 
 def places_of(heads: Heads, which: Wanted) -> NDArray[np.bool_]:
     """Which of the heads are of a wanted message."""
-    return np.asarray((heads != NO_HEAD) & which[np.maximum(heads, 0) >> 24])
+    found: Wanted = which[heads >> 24]  # the last element of the table is that of NO_HEAD: nobody wants it
+    return found
 
 
 def payload_of(datagram: bytes, message: int) -> bytes:

@@ -1,4 +1,4 @@
-"""What no stage of the picture reads (attitudes, inertial samples, air data but winds), gathered: far the most of what comes in thick.
+"""What no stage of the picture reads (attitudes, inertial samples, air data but winds), gathered: most of what comes in thick.
 
 It goes to the sinks all the same. What is read by a stage is an arrival of its own, at its own instant; of what is not, it is
 enough to know what was said, and in which order.
@@ -35,6 +35,13 @@ class Gathered:
         self._observations: list[Observation] = []
         self._counts = Counter[int]()  # of observations, by source
         self._place = self._received_at = 0
+        self._said_at = 0  # it comes behind what was said since, and what is heard does not go back
+
+    def say(self, place: int, received_at: int, heard: Heard | None) -> None:
+        """What an arrival said that a stage reads, if it said anything."""
+        if heard is not None:
+            self._said_at = received_at
+            self.said.append((place, heard))
 
     def add(self, place: int, number: int, received_at: int, found: Sequence[Observation]) -> None:
         """What an arrival of a source said that no stage reads."""
@@ -52,9 +59,7 @@ class Gathered:
         """What was added since the last time is complete."""
         if not self._observations and not notes:
             return
-        now = self._epoch.session_time(self._received_at)
-        if self.said:  # it comes behind what was said since, and what is heard never goes back
-            now = max(now, self.said[-1][1].now)
+        now = self._epoch.session_time(max(self._received_at, self._said_at))
         self.said.append((self._place, Heard(now, tuple(self._observations), notes)))
         for number, count in self._counts.items():
             self._listened[number].count(self._received_at, count)

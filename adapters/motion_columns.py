@@ -44,22 +44,29 @@ def scaled_imu(rows: Rows, told: Sequence[tuple[int, NDArray[Any]]]) -> Many:
     known = in_milli_g | np.array([one == ARDUPILOT for one in rows.autopilots])[rows.vehicle]
     if not known.all():
         rows.count("raw units unknown", ~known)
-        rows, axes, usec, sensor = rows[known], axes[known], usec[known], sensor[known]
+        rows, axes, usec, sensor = rows.saying(known), axes[known], usec[known], sensor[known]
     values = axes.astype(np.float64)
-    cut = np.logical_or.reduce((np.abs(values) >= CUT_OFF).reshape(-1, 3, 3), axis=2)
     values[:, :3] *= MILLI_G
     values[:, 3:] /= 1000
-    vectors = values.reshape(-1, 3, 3)
-    rows.count("inertial out of range", np.logical_or.reduce(cut, axis=1))
-    nothing = np.logical_and.reduce(vectors == 0.0, axis=2)
-    nothing[:, 1] &= nothing[:, 0]  # nothing turns beside what is accelerated
-    has = ~cut & ~nothing
-    says = np.logical_or.reduce(has, axis=1)
-    rows.count("inertial unit without data", ~says)
-    vectors[~has] = np.nan
+    vectors, has = values.reshape(-1, 3, 3), _has(rows, axes.reshape(-1, 3, 3))
+    if not has.all():
+        vectors[~has] = np.nan
     _show(rows, sensor, vectors, has)
     columns = {name: vectors[:, place] for place, name in enumerate(_FIELDS)}
-    return rows.many(ImuSample, says, rows.near(usec), sensor=sensor, **columns)
+    return rows.many(ImuSample, np.logical_or.reduce(has, axis=1), rows.near(usec), sensor=sensor, **columns)
+
+
+def _has(rows: Rows, axes: NDArray[np.int16]) -> Truths:
+    """Which of the three vectors of each row are measured; counts those that are cut off, and rows without any."""
+    if axes.size and axes.all() and axes.max() < CUT_OFF and axes.min() > -CUT_OFF:
+        return np.ones(axes.shape[:2], np.bool_)
+    cut = np.logical_or.reduce((axes >= CUT_OFF) | (axes <= -CUT_OFF), axis=2)
+    nothing = np.logical_and.reduce(axes == 0, axis=2)
+    nothing[:, 1] &= nothing[:, 0]  # nothing turns beside what is accelerated
+    has: Truths = ~cut & ~nothing
+    rows.count("inertial out of range", np.logical_or.reduce(cut, axis=1))
+    rows.count("inertial unit without data", ~np.logical_or.reduce(has, axis=1))
+    return has
 
 
 def _told(message: int, told: NDArray[Any]) -> tuple[NDArray[np.int16], Integers, Integers, Truths]:
@@ -72,13 +79,15 @@ def _told(message: int, told: NDArray[Any]) -> tuple[NDArray[np.int16], Integers
     return axes, told["time_boot_ms"].astype(np.int64) * 1000, sensor, np.ones(len(told), np.bool_)
 
 
-def _show(rows: Rows, sensor: NDArray[np.int64], vectors: Floats, told: Truths) -> None:
+def _show(rows: Rows, sensor: Integers, vectors: Floats, has: Truths) -> None:
     """Keep for people the last vectors of each vehicle's sensors."""
     order = np.argsort(rows.places)
-    keys = rows.vehicle << 16 | sensor
+    keys = (rows.vehicle << 16 | sensor)[order].tolist()
+    everywhere = dict(zip(keys, order.tolist(), strict=True))
     for place in range(3):
-        which = order[told[order, place]]
-        last = dict(zip(keys[which].tolist(), which.tolist(), strict=True))
+        last = everywhere
+        if not has[:, place].all():
+            last = {key: row for key, row in zip(keys, order.tolist(), strict=True) if has[row, place]}
         for key, row in last.items():
             vector = tuple(vectors[row, place].tolist())
             rows.shown.append((int(rows.places[row]), rows.vehicles[key >> 16].inertial, (key & 0xFFFF, place), vector))

@@ -27,10 +27,11 @@ Shown = tuple[int, MutableMapping[Any, Any], Any, Any]
 class Rows:
     """One row a frame, in their order. `places` rise and tell the order of frames of different messages.
 
-    `vehicle` and `source` are each row's in `vehicles` (with their `autopilots` then) and `counters`. `shown` gathers what
-    people are to be shown, as (place, where it is kept, by which name, the value), `said` how many observations each source
-    made. `newest`: the newest time since boot that the sender had told, and what had passed since, ns; `added`: what brings
-    it to the session's time; of a sender that has told no time (`knows_time`) they are the stamp, and what brings that to it.
+    `vehicle` and `source` are each row's in `vehicles` (with their `names`, and their `autopilots` then) and `counters`.
+    `shown` gathers what people are to be shown, as (place, where it is kept, by which name, the value), `silent` the sources
+    of rows that say nothing. `newest`: the newest time since boot that the sender had told, and what had passed since, ns;
+    `added`: what brings it to the session's time; of a sender that has told no time (`knows_time`) they are the stamp, and
+    what brings that to it.
     """
 
     places: Integers
@@ -41,10 +42,11 @@ class Rows:
     added: Integers
     knows_time: Truths
     vehicles: Sequence[Vehicle]
+    names: NDArray[np.object_]
     autopilots: Sequence[int | None]
     counters: Mapping[int, Counter[str]]
     shown: list[Shown]
-    said: Counter[int]
+    silent: list[Integers]
 
     def __len__(self) -> int:
         return len(self.places)
@@ -53,50 +55,55 @@ class Rows:
         """Some of them: a mask or a slice."""
         return replace(self, **{name: getattr(self, name)[which] for name in _BY_ROW})
 
+    def saying(self, which: Truths) -> Rows:
+        """Those that say something; the others are noted in `silent`."""
+        self.silent.append(self.source[~which])
+        return self[which]
+
     def count(self, reason: str, which: Truths) -> None:
         """One more of this reason for each of these rows, with their sources."""
-        for source, count in self._by_source(which):
-            self.counters[source][reason] += count
+        for source in self.source[which].tolist():
+            self.counters[source][reason] += 1
 
-    def _by_source(self, which: Truths) -> list[tuple[int, int]]:
-        counts = np.bincount(self.source[which])
-        return [(source, int(counts[source])) for source in np.flatnonzero(counts).tolist()]
-
-    def within(self, values: NDArray[Any], least: float, greatest: float) -> Floats:
-        """The values that are numbers in their range; else NaN, counted."""
-        told = values.astype(np.float64)
-        good = (told >= least) & (told <= greatest)
-        if not good.all():
-            is_none = np.isnan(told)
-            self.count("not a number", is_none)
-            self.count("air data out of range", ~good & ~is_none)
-            told[~good] = np.nan
-        return told
+    def within(self, values: Floats, least: Floats | float, greatest: Floats | float) -> Floats:
+        """The values that are numbers in their range, else NaN, counted: of each row, or several lines of such."""
+        good = (values >= least) & (values <= greatest)
+        if good.all():
+            return values
+        is_none = np.isnan(values)
+        for none, bad in zip(np.atleast_2d(is_none), np.atleast_2d(~good & ~is_none), strict=True):
+            self.count("not a number", none)
+            self.count("air data out of range", bad)
+        return np.where(good, values, np.nan)
 
     def at_receipt(self) -> Integers:
         """As `Moments.shown_at_receipt`."""
         return self.newest + self.added
 
-    def near(self, usec: NDArray[Any]) -> Integers:
-        """As `Moments.shown_near`."""
+    def near(self, usec: Integers) -> Integers:
+        """As `Moments.shown_near`; a time that is UTC is LEAST_UNIX_USEC, or more."""
         is_boot = (usec < LEAST_UNIX_USEC) & self.knows_time
-        boot = np.where(is_boot, usec, 0).astype(np.int64) * 1000
+        boot = usec * 1000
+        if is_boot.all() and (np.abs(boot - self.newest) <= STRAY_NS).all():
+            return boot + self.added
         apart = (boot - self.newest + WRAP_NS // 2) % WRAP_NS - WRAP_NS // 2
         return self.newest + np.where(is_boot & (np.abs(apart) <= STRAY_NS), apart, 0) + self.added
 
-    def show(self, name: str, values: Floats) -> None:
-        """Keep for people the last of the values that is a number, of each vehicle."""
-        told = ~np.isnan(values)
-        last = dict(zip(self.vehicle[told].tolist(), np.flatnonzero(told).tolist(), strict=True))
-        for vehicle, row in last.items():
-            self.shown.append((int(self.places[row]), self.vehicles[vehicle].readings, name, float(values[row])))
+    def show(self, names: Sequence[str], values: Floats) -> None:
+        """Keep for people of each name the last value that is a number, of each vehicle; `values`: (names, rows)."""
+        vehicles, told = self.vehicle.tolist(), ~np.isnan(values)
+        everywhere = dict(zip(vehicles, range(len(self)), strict=True))
+        for name, of_name, has in zip(names, values, told, strict=True):
+            last = everywhere
+            if not has.all():
+                last = {vehicles[row]: row for row in np.flatnonzero(has).tolist()}
+            for vehicle, row in last.items():
+                self.shown.append((int(self.places[row]), self.vehicles[vehicle].readings, name, float(of_name[row])))
 
     def many(self, kind: type[ImuSample | AirData], says: Truths, valid_at: Integers, **columns: NDArray[Any]) -> Many:
         """What these rows say."""
-        for source, count in self._by_source(says):
-            self.said[source] += count
-        names = np.array([vehicle.name for vehicle in self.vehicles], object)
-        told = {"aircraft": names[self.vehicle], "valid_at": valid_at, "received_at": self.received_at, **columns}
+        told = {"aircraft": self.names[self.vehicle], "valid_at": valid_at, "received_at": self.received_at, **columns}
         if not says.all():
+            self.silent.append(self.source[~says])
             told = {name: column[says] for name, column in told.items()}
         return Many(kind, told)

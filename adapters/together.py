@@ -104,8 +104,7 @@ class _Hearing:
                 self._gather(place, arrival, components[sender], head >> 24)
             else:
                 heard = self._by.hear_counted(arrival, components[sender], head >> 24)
-                if heard is not None:
-                    self.gathered.said.append((place, heard))
+                self.gathered.say(place, arrival.received_at, heard)
             if sender >= 0:
                 waiting.note(sender)
             if self._state() != state:
@@ -117,8 +116,7 @@ class _Hearing:
         heard, is_refused = self._by.hear(arrival, head)
         if is_refused:
             self.refused.append(place)
-        if heard is not None:
-            self.gathered.said.append((place, heard))
+        self.gathered.say(place, arrival.received_at, heard)
 
     def _gather(self, place: int, arrival: Arrival, component: Component, message: int) -> None:
         received_at, number, data, _ = arrival

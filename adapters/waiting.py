@@ -67,6 +67,7 @@ class Waiting:
         self._may = places_of(heads, _WAITING) & (senders >= 0)
         self._places = np.empty(0, np.int64)
         self._vehicles: list[Vehicle] = []
+        self._names = np.empty(0, object)
         self._autopilots: list[int | None] = []
         self._number = np.empty(0, np.int64)  # of each component's vehicle
         self._awaited: set[int] = set()  # components
@@ -81,6 +82,7 @@ class Waiting:
             wait[:] = False
         self._places = places[wait]
         self._vehicles = [vehicle for vehicle in vehicles if vehicle is not None]
+        self._names = np.array([vehicle.name for vehicle in self._vehicles], object)
         self._autopilots = [one.status.autopilot if one.status is not None else None for one in self._vehicles]
         self._number = np.cumsum(has_one) - 1
         self._awaited = set(self._senders[self._places].tolist())
@@ -117,13 +119,13 @@ class Waiting:
     def read(self) -> tuple[list[Many], Counter[int], int]:
         """What those say that came before the place `at`; how many observations by source, and the place of the last one."""
         places = self._places[self._places < self.at]
-        said, shown, found = Counter[int](), list[Shown](), list[Many]()
+        said, shown, found, silent = Counter[int](), list[Shown](), list[Many](), list[Integers]()
         if not len(places):
             return found, said, -1
         self._mark_heard(places)
         kinds = _ORDER[self._heads[places] >> 24]
         order = np.argsort(kinds, kind="stable")
-        rows, places, kinds = self._rows(places[order], shown, said), places[order], kinds[order]
+        rows, places, kinds = self._rows(places[order], shown, silent), places[order], kinds[order]
         begins = np.flatnonzero(are_first(kinds)).tolist()
         bounds = list(zip(kinds[begins].tolist(), begins, [*begins[1:], len(kinds)], strict=True))
         for reader, of_family in groupby(bounds, lambda one: _READ[one[0]][0]):
@@ -132,12 +134,16 @@ class Waiting:
             one = reader(rows[parts[0][1] : parts[-1][2]], told)
             if len(one):
                 found.append(one)
+        for number, count in enumerate(np.bincount(rows.source).tolist()):
+            said[number] += count
+        for number, count in enumerate(np.bincount(np.concatenate(silent)).tolist() if silent else ()):
+            said[number] -= count
         shown.sort(key=itemgetter(0))
         for _, where, name, value in shown:
             where[name] = value
         return found, said, int(places.max())
 
-    def _rows(self, places: Integers, shown: list[Shown], said: Counter[int]) -> Rows:
+    def _rows(self, places: Integers, shown: list[Shown], silent: list[Integers]) -> Rows:
         senders, received_at = self._senders[places], self._arrivals.received_at[places]
         marks = np.array(sorted(self._marks), np.int64)
         mark = marks[np.searchsorted(marks[:, 0], self._key(senders, places), side="right") - 1]
@@ -152,10 +158,11 @@ class Waiting:
             mark[:, 3],
             knows_time,
             self._vehicles,
+            self._names,
             self._autopilots,
             self._counters,
             shown,
-            said,
+            silent,
         )
 
     def _fields(self, message: int, places: Integers) -> NDArray[Any]:
