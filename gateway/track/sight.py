@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.frames import polar_from_xyz, polar_jacobian, xyz_from_polar
+from gateway.frames import polar_from_xyz, polar_jacobian
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -16,6 +16,10 @@ GUESSED_ELEVATION_RAD, GUESSED_SIGMA_RAD = (
     math.radians(3.0),
     math.radians(3.0),
 )  # where none was measured: aircraft are low
+
+LEAST_RANGE_M = 10.0  # nothing nearer begins a track: angles mean nothing there
+LEAST_SIGMA_M = 1e-3
+_DIAGONAL = np.arange(3)
 
 
 class RadarSight:
@@ -36,11 +40,18 @@ class RadarSight:
 
     def placed(self, value: Floats, variance: Floats) -> tuple[Bools, Floats, Floats]:
         """Where range and azimuth are measured; without an elevation at a guessed one, of which little is claimed."""
-        whole: Bools = np.logical_not(np.isnan(value[:2]).any(axis=0))
+        whole: Bools = (value[0] >= LEAST_RANGE_M) & ~np.isnan(value[1])
         polar, spread = value[:, whole], variance[:, whole]
         level = np.isnan(polar[2])
         polar[2, level], spread[2, level] = GUESSED_ELEVATION_RAD, GUESSED_SIGMA_RAD**2
-        xyz = xyz_from_polar(polar.T)
-        back = np.linalg.inv(polar_jacobian(xyz)) if len(xyz) else np.zeros((0, 3, 3))
-        covariance = (back * spread.T[:, None, :]) @ back.transpose(0, 2, 1)
-        return whole, xyz.T, covariance.transpose(1, 2, 0)
+        distance, azimuth, elevation = polar
+        level, sine, cosine = np.cos(elevation), np.sin(azimuth), np.cos(azimuth)
+        outward = np.stack([level * cosine, level * sine, np.sin(elevation)])
+        aside = distance * level * np.stack([-sine, cosine, np.zeros_like(sine)])
+        upward = distance * np.stack([-np.sin(elevation) * cosine, -np.sin(elevation) * sine, level])
+        axes = (outward, aside, upward)
+        covariance = sum(
+            (part * axis[:, None] * axis for part, axis in zip(spread, axes, strict=True)), np.zeros((3, 3, 1))
+        )
+        covariance[_DIAGONAL, _DIAGONAL] += LEAST_SIGMA_M**2
+        return whole, distance * outward, covariance
