@@ -79,7 +79,7 @@ class Evidence:
     """What is known: of k links (aircraft and radar) information (k, 7, 7) and vector (k, 7); what aircraft that left told.
 
     `last`: (k,) when each link's last pair was, ns. `folded`: (p, p) and (p,), of all radars and the common error.
-    `pairs`: how many there were of each radar, unfaded.
+    `pairs` and `seen`: how many pairs there were of each radar, unfaded, and of how many aircraft.
     """
 
     links: tuple[Link, ...] = ()
@@ -89,6 +89,7 @@ class Evidence:
     radars: tuple[int, ...] = ()
     folded: tuple[Floats, Floats] = field(default_factory=lambda: (np.zeros((3, 3)), np.zeros(3)))
     pairs: tuple[int, ...] = ()
+    seen: tuple[int, ...] = ()
 
     def place_of(self, radar: int) -> slice:
         """Where a radar's parameters are among all."""
@@ -155,6 +156,7 @@ def without(evidence: Evidence, radar: int) -> Evidence:
         tuple(number for number in evidence.radars if number != radar),
         (total[np.ix_(others, others)], vector[others]),
         tuple(n for n, number in zip(evidence.pairs, evidence.radars, strict=True) if number != radar),
+        tuple(n for n, number in zip(evidence.seen, evidence.radars, strict=True) if number != radar),
     )
 
 
@@ -181,9 +183,11 @@ def with_radars(evidence: Evidence, numbers: Sequence[int]) -> Evidence:
     kept = np.array([*known, *range(size - 3, size)])
     total, vector = np.zeros((size, size)), np.zeros(size)
     total[np.ix_(kept, kept)], vector[kept] = evidence.folded
-    count = dict(zip(evidence.radars, evidence.pairs, strict=True))
-    pairs = tuple(count.get(radar, 0) for radar in radars)
-    return replace(evidence, radars=radars, folded=(total, vector), pairs=pairs)
+    pairs, seen = (
+        tuple(dict(zip(evidence.radars, counts, strict=True)).get(radar, 0) for radar in radars)
+        for counts in (evidence.pairs, evidence.seen)
+    )
+    return replace(evidence, radars=radars, folded=(total, vector), pairs=pairs, seen=seen)
 
 
 def _with_links(evidence: Evidence, links: Sequence[Link]) -> Evidence:
@@ -191,8 +195,10 @@ def _with_links(evidence: Evidence, links: Sequence[Link]) -> Evidence:
     new = [link for link in dict.fromkeys(links) if link not in known]
     if not new:
         return evidence
+    more = [sum(number == radar for _, number in new) for radar in evidence.radars]
     return replace(
         evidence,
+        seen=tuple(known + count for known, count in zip(evidence.seen, more, strict=True)),
         links=(*evidence.links, *new),
         information=np.concatenate([evidence.information, np.zeros((len(new), BLOCK, BLOCK))]),
         vector=np.concatenate([evidence.vector, np.zeros((len(new), BLOCK))]),

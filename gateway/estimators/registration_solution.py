@@ -147,9 +147,7 @@ def folded(evidence: Evidence, before: int, own_sigma_m: float) -> Evidence:
     equations = _Equations.of(left)
     own_m = np.full(len(equations.aircraft), own_sigma_m)
     total, vector = equations.without_own(own_m, equations.apart(own_m))
-    return Evidence(
-        rest.links, rest.information, rest.vector, rest.last, evidence.radars, (total, vector), evidence.pairs
-    )
+    return replace(rest, folded=(total, vector))
 
 
 def against_past(evidence: Evidence, own_sigma_m: float, common_sigma_m: float = COMMON_SIGMA_M) -> dict[int, float]:
@@ -173,14 +171,12 @@ def against_past(evidence: Evidence, own_sigma_m: float, common_sigma_m: float =
 
 
 def _some(evidence: Evidence, places: list[int]) -> Evidence:
-    return Evidence(
-        tuple(evidence.links[place] for place in places),
-        evidence.information[places],
-        evidence.vector[places],
-        evidence.last[places],
-        evidence.radars,
-        evidence.folded,
-        evidence.pairs,
+    return replace(
+        evidence,
+        links=tuple(evidence.links[place] for place in places),
+        information=evidence.information[places],
+        vector=evidence.vector[places],
+        last=evidence.last[places],
     )
 
 

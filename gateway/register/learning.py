@@ -29,7 +29,7 @@ from gateway.register.choosing import LEAST_PAIRS, Choice, chosen
 from gateway.register.corrections import Steps, largest_step, stated
 from gateway.register.pairing import Gathered
 from gateway.register.remembered import Remembered, RememberedRadar, in_words
-from gateway.register.verdicts import NAMES, Verdict
+from gateway.register.verdicts import FEW, NAMES, SIGNIFICANT, SIGNIFICANT_OF_FEW, Verdict
 from gateway.register.watching import Watch
 from gateway.settings import PositionSource, RadarSite, Registering
 
@@ -78,7 +78,7 @@ class Registration:
         """What is known of each error of a radar; None before anything is."""
         if self.solution is None or radar.number not in self.solution.radars:
             return None
-        return _verdicts(self.solution, radar)
+        return _verdicts(self.solution, radar, self.evidence)
 
     # what happens each second --------------------------------------------------------------------------------------
 
@@ -192,7 +192,9 @@ class Registration:
                 continue
             radar = radars[number]
             before = choices.get(number, Choice.nothing(stated(radar)))
-            choices[number], told = chosen(before, _verdicts(solution, radar), radar, use, at, trusted=not wrong)
+            choices[number], told = chosen(
+                before, _verdicts(solution, radar, evidence), radar, use, at, trusted=not wrong
+            )
             said += [Said("info", text) for text in told]
         known = replace(given_up, evidence=evidence, solution=solution, solved_at=at, is_new=False)
         return replace(known, choices=choices, is_prior_wrong=wrong, doubted=doubted), said
@@ -271,17 +273,13 @@ class Registration:
         return Remembered(at, *runway, tuple(rows)) if rows else None
 
 
-def _verdicts(solution: Solution, radar: RadarSite) -> tuple[Verdict, ...]:
+def _verdicts(solution: Solution, radar: RadarSite, evidence: Evidence) -> tuple[Verdict, ...]:
     row = solution.radars.index(radar.number)
-    parts = zip(
-        NAMES,
-        solution.error[row].tolist(),
-        solution.sigma[row].tolist(),
-        solution.observable[row].tolist(),
-        stated(radar),
-        strict=True,
-    )
-    return tuple(Verdict(*part) for part in parts)
+    seen = dict(zip(evidence.radars, evidence.seen, strict=True)).get(radar.number, 0)
+    enough = SIGNIFICANT if seen > FEW else SIGNIFICANT_OF_FEW
+    found, sigma = solution.error[row].tolist(), solution.sigma[row].tolist()
+    parts = zip(NAMES, found, sigma, solution.observable[row].tolist(), stated(radar), strict=True)
+    return tuple(Verdict(*part, enough) for part in parts)
 
 
 def _prior_in_words(solution: Solution) -> str:

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 SIGNIFICANT = 3.0  # sigmas
+# Of so few aircraft it takes more: their own errors are then half of what is found, it is looked at again and again, and what
+# is taken off wrongly does harm where a little that is left does none.
+FEW, SIGNIFICANT_OF_FEW = 3, 4.5
 PLAIN = 6.0  # sigmas: an error so large is worth taking off however well it is known; but for a clock's
 NAMES = ("range", "azimuth", "elevation", "time")
 UNITS = ("m", "degrees", "degrees", "ms")
@@ -22,7 +25,7 @@ Use = Literal["to be applied", "applied"]  # what is done with what was found: o
 class Verdict:
     """One error of a radar: by how much it measures too much (azimuth to the left, time late; SI), and what that is worth.
 
-    `stated`: what the site file says that it is.
+    `stated`: what the site file says that it is. `significant`: how many sigmas off that it has to be.
     """
 
     name: str
@@ -30,11 +33,12 @@ class Verdict:
     sigma: float
     observable: bool
     stated: float = 0.0
+    significant: float = SIGNIFICANT
 
     @property
     def is_found(self) -> bool:
         """Whether it is worth taking off."""
-        return self.is_told and self.off_sigmas > SIGNIFICANT
+        return self.is_told and self.off_sigmas > self.significant
 
     @property
     def is_told(self) -> bool:
