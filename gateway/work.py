@@ -18,6 +18,7 @@ from gateway.register import WAIT_NS, gathered, remaining, residuals
 from gateway.track import Key, RadarTracks
 from gateway.tracking import Tracked, Tracking
 
+QUARTER = SECOND // 4
 PLOT_MARGIN_S = 4.0  # plots are remembered this much longer than reports: a report's check looks back over them
 
 
@@ -29,8 +30,8 @@ class Work(Tracking):
     def seconds_until(self, arrival: Heard) -> Iterator[int]:
         """The whole seconds before an arrival, with a watermark also at its very instant.
 
-        What else happens by itself is done on the way: checks that are due before them, in each of them ends and coasting, and
-        after what is made of it forgetting.
+        What else happens by itself is done on the way: checks that are due before them, in each of them ends and coasting,
+        and at the quarters between them forgetting, judging scatter, and bringing radars together.
         """
         now, watermark = arrival.now, not arrival.observations
         if self.now is None or now < self.now - self.history:
@@ -41,22 +42,38 @@ class Work(Tracking):
             self._track_due()
             self._check_due()
             if at == self.instant:
-                self._live_until(at)
-                yield at
-                self._forget(at)
-                idle = not self.lanes.lanes and self.association.due is None
-                self.instant = (max((now - 1) // SECOND * SECOND, at) if idle else at) + SECOND
+                if is_whole := at % SECOND == 0:
+                    self._live_until(at)
+                    yield at
+                is_idle = is_whole and not self.lanes.lanes and self.association.due is None
+                for turn in (1, 2, 3) if is_idle else (at % SECOND // QUARTER,):
+                    self._in_turn(turn, at)
+                self.instant = max((now - 1) // SECOND * SECOND, at) + SECOND if is_idle else at + QUARTER
             due = self._next_check()
         self.now = max(now, self.now or now)
         self.events += [Event(now, level, text) for level, text in arrival.notes]
 
-    def _live_until(self, at: int) -> None:
-        """Ends, coasting, and what scatters otherwise than stated."""
-        self._settle()
-        self._join_radars(at)
-        self.consistency, findings = self.consistency.judged(self.site.position, self.radars, at)
+    def _in_turn(self, quarter: int, at: int) -> None:
+        """What is done once a second between the whole seconds: of a crowd it would hold up for long what comes, all at once."""
+        if quarter:
+            self._settle()
+        if quarter == 1:
+            self._forget(at)
+        elif quarter == 2:
+            self._judge(at)
+        elif quarter == 3:
+            self._join_radars(at)
+
+    def _judge(self, at: int) -> None:
+        """What scatters otherwise than stated."""
+        whole = at // SECOND * SECOND
+        self.consistency, findings = self.consistency.judged(self.site.position, self.radars, whole)
         for found in findings:
             self._say_scatter(found)
+
+    def _live_until(self, at: int) -> None:
+        """Ends and coasting."""
+        self._settle()
         lanes, ended = fuse.end_silent(self.lanes, at, self.options)
         self.settled += fuse.settled(self.lanes, lanes)
         self.ended += ended
