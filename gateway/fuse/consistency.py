@@ -12,19 +12,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix, Plot
-from gateway.estimators.kalman import VELOCITY
 from gateway.fuse.events import Event, Measure
-from gateway.fuse.evidence import ENOUGH, PLOT, REPORT, Part, Sums, evidence
-from gateway.fuse.scatter import left_of_plots, left_of_reports, rows_of
+from gateway.fuse.evidence import ENOUGH, PLOT, REPORT, Part, evidence, factors, summed
+from gateway.fuse.scatter import Rows, left_of_plots, left_of_reports, rows_of
 from gateway.settings import PositionSource, RadarSite
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 SURE = 12.0  # evidence that is sure of a single noise; of many, the logarithm of their number more
 LASTING = 0.3  # a receiver whose reports scatter by less than this share of what is stated has errors that last
@@ -32,11 +32,10 @@ TOGETHER_AT_LEAST, TOGETHER_ENOUGH = 3, 4.0 * ENOUGH  # aircraft, and squares of
 MANY, WAIT_NS = 64, 5 * SECOND  # measurements that are judged at once, or all that came in so long
 KEPT_PLOTS, KEPT_REPORTS = 6, 3  # of each track and source, to hold the next ones against
 KEPT_NS = 30 * SECOND
-SOURCES_AT_MOST = 4096  # the least lately heard are forgotten
+NOISES_AT_MOST = 8192  # the least lately heard are forgotten
 FORGOTTEN_NS = 3600 * SECOND  # and those that were not heard for so long
 
 Key = tuple[str, str, bool]  # source, part, whether the site file sets its noise
-Group = tuple[int, int]  # track, and radar or 0 for reports
 ALL = "GPS"  # the source that all aircraft together are
 
 
@@ -50,26 +49,39 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What a second's measurements tell of one noise: the sums of `evidence`, and what is stated of it."""
+    """What new measurements tell of one part of each: whose noises these are, and the sums of `evidence`, (n, 9)."""
 
-    measure: Measure
     part: Part
-    sigma: float
-    added: Floats  # (9,)
+    keys: list[Key]
+    measures: list[Measure]
+    sigma: Floats  # (n,) as stated
+    evidence: Floats
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Consistency:
-    """What is known of each source and part, the least lately heard first; and the measurements of the last second."""
+    """What is known of each noise; the measurements of the last second; and what the next ones are held against."""
 
-    sums: Mapping[Key, Sums] = field(default_factory=dict)
+    noises: Mapping[Key, int] = field(default_factory=dict)  # the row of each in what follows
+    sums: Floats = field(default_factory=lambda: np.zeros((0, 9)))  # as `summed` has them
+    heard: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # when each source was last
     waiting: tuple[tuple[int, Event], ...] = ()
-    heard: Mapping[str, int] = field(default_factory=dict)  # when each source was last
-    recent: Mapping[Group, tuple[Event, ...]] = field(default_factory=dict)
+    reports: Rows | None = None
+    plots: Rows | None = None
 
     def hearing(self, events: Iterable[tuple[int, Event]]) -> Consistency:
         """The same with new measurements waiting to be judged, each with its track."""
-        return Consistency(self.sums, (*self.waiting, *events), self.heard, self.recent)
+        return replace(self, waiting=(*self.waiting, *events))
+
+    @property
+    def levels(self) -> Floats:
+        """The greatest evidence on each noise, (n,)."""
+        return np.asarray(self.sums[:, ::3].max(axis=1, initial=0.0))
+
+    @property
+    def sure(self) -> float:
+        """How much evidence is sure."""
+        return SURE + math.log(max(len(self.noises), 1))
 
     def judged(
         self,
@@ -83,126 +95,96 @@ class Consistency:
         """
         if len(self.waiting) < MANY and at % WAIT_NS:
             return self, []
-        groups, recent = self._grouped(at)
-        told: dict[Key, Told] = {}
-        for plots in (False, True):
-            chosen = [group for key, group in groups.items() if (key[1] != 0) == plots]
-            if chosen:
-                told |= _told(chosen, position, radars)
-        sums, heard = dict(self.sums), dict(self.heard)
-        for key, one in told.items():
-            sums[key] = sums.pop(key, Sums()).plus(one.added.tolist())
-            heard[key[0]] = one.measure.at
-        sure = SURE + math.log(max(len(sums), 1))
-        for key, one in _together(told, sums, sure).items():
-            sums[key] = sums.pop(key, Sums()).plus(one.added.tolist())
-            told[key], heard[key[0]] = one, one.measure.at
-        found = _findings(told, sums, sure)
-        _forget(sums, heard, at)
-        return Consistency(sums, heard=heard, recent=recent), found
+        waiting = sorted(self.waiting, key=lambda one: one[1].measure.serial)
+        told, kept = [], []
+        for known, count, plots in ((self.reports, KEPT_REPORTS, False), (self.plots, KEPT_PLOTS, True)):
+            new = [one for one in waiting if isinstance(one[1].measure, Plot) == plots]
+            rows = rows_of(new).merged(known) if new else known
+            if rows is not None and new:
+                told += _told(rows, [event for _, event in new], position, radars)
+            latest = None if rows is None else rows.latest(count, at - KEPT_NS)
+            kept.append(latest if latest is not None and len(latest.at) else None)
+        after = replace(self, waiting=(), reports=kept[0], plots=kept[1])
+        after, found = after._summed(told, at) if told else (after, [])
+        return after._remembered(at), found
 
-    def _grouped(self, at: int) -> tuple[dict[Group, tuple[list[Event], int]], dict[Group, tuple[Event, ...]]]:
-        """What waited, in order behind what was kept of the same track and source (how many); and what is kept of it now.
+    def _summed(self, told: Sequence[Told], at: int) -> tuple[Consistency, list[Finding]]:
+        """The same with evidence added to the sums, and what is sure by now."""
+        everybody = [(ALL, one.part.name, True) for one in told if one.part in REPORT]
+        every = dict.fromkeys((*self.noises, *(key for one in told for key in one.keys), *everybody))
+        noises = {key: row for row, key in enumerate(every)}
+        added = np.zeros((len(noises), 9))
+        rows = [np.array([noises[key] for key in one.keys], dtype=np.int64) for one in told]
+        for one, place in zip(told, rows, strict=True):
+            np.add.at(added, place, one.evidence)
+        sums, heard = np.zeros((len(noises), 9)), np.full(len(noises), at)
+        sums[: len(self.sums)], heard[: len(self.heard)] = self.sums, self.heard
+        sums = summed(sums, added)
+        heard[np.concatenate(rows)] = at
+        after = replace(self, noises=noises, sums=sums, heard=heard)
+        factor = factors(sums, after.sure)
+        found: dict[tuple[str, str], Finding] = {}
+        for one, place in zip(told, rows, strict=True):
+            of_all = _together(one, place, noises, sums, added, factor, after.sure)
+            for row in np.flatnonzero(~np.isnan(factor[place])).tolist():
+                key = one.keys[row]
+                if not (key[2] and of_all) and (finding := _finding(one, row, key, float(factor[place[row]]))):
+                    found[key[0], key[1]] = finding
+            if of_all:
+                found[ALL, one.part.name] = of_all
+        return after, list(found.values())
 
-        What comes too late to be in order tells nothing.
-        """
-        arrived: dict[Group, list[Event]] = {}
-        for track, event in sorted(self.waiting, key=lambda one: one[1].measure.serial):
-            source = event.measure.radar if isinstance(event.measure, Plot) else 0
-            arrived.setdefault((track, source), []).append(event)
-        recent = {key: kept for key, kept in self.recent.items() if kept[-1].at > at - KEPT_NS}
-        groups = {}
-        for key, events in arrived.items():
-            known = recent.pop(key, ())
-            row = list(known)
-            for event in sorted(events, key=lambda one: one.at):
-                if not row or event.at > row[-1].at:
-                    row.append(event)
-            if len(row) > len(known):
-                groups[key] = row, len(known)
-            recent[key] = tuple(row[-(KEPT_PLOTS if key[1] else KEPT_REPORTS) :])
-        return groups, recent
+    def _remembered(self, at: int) -> Consistency:
+        """The same without noises of sources that were not heard for long, or of too many."""
+        keep = self.heard >= at - FORGOTTEN_NS
+        if len(keep) > NOISES_AT_MOST:
+            keep &= self.heard.argsort(kind="stable").argsort() >= len(keep) - NOISES_AT_MOST
+        if keep.all():
+            return self
+        keys = [key for key, is_kept in zip(self.noises, keep.tolist(), strict=True) if is_kept]
+        return replace(
+            self, noises={key: row for row, key in enumerate(keys)}, sums=self.sums[keep], heard=self.heard[keep]
+        )
 
 
-def _told(
-    groups: Sequence[tuple[list[Event], int]],
-    position: PositionSource,
-    radars: Mapping[int, RadarSite],
-) -> dict[Key, Told]:
-    """What the new measurements of some groups of one kind, reports or plots, tell."""
-    rows, events = rows_of(groups), [event for group, _ in groups for event in group]
+def _told(rows: Rows, events: Sequence[Event], position: PositionSource, radars: Mapping[int, RadarSite]) -> list[Told]:
+    """What new measurements of one kind, reports or plots, tell of each of their parts; `rows` names them by number."""
     is_plot = isinstance(events[0].measure, Plot)
-    speed_mps = np.sqrt(np.square([event.mean[VELOCITY] for event in events]).sum(axis=1)) if is_plot else np.empty(0)
-    left = left_of_plots(rows, speed_mps) if is_plot else left_of_reports(rows)
+    left = left_of_plots(rows) if is_plot else left_of_reports(rows)
     fresh = np.flatnonzero(rows.new)
-    left, new = left.of(fresh), [events[row] for row in fresh.tolist()]
-    stated = np.array([_stated(event.measure) for event in new])
-    said = [_said(event.measure, position, radars) for event in new]
-    sources = [_source(event.measure) for event in new]
-    found: dict[Key, Told] = {}
+    if not len(fresh):
+        return []
+    left, sigma = left.of(fresh), rows.sigma[fresh]
+    new = [events[place] for place in rows.event[fresh].tolist()]
+    measures = [event.measure for event in new]
+    sources = [_source(measure) for measure in measures]
+    said = np.array([_said(measure, position, radars) for measure in measures]).reshape(len(new), -1)
+    found = []
     for number, part in enumerate(PLOT if is_plot else REPORT):
-        amounts = evidence(left, new, stated[:, number], part)
-        keys = [
-            (source, part.name, math.isclose(sigma, one[number], rel_tol=1e-9))
-            for source, sigma, one in zip(sources, stated[:, number].tolist(), said, strict=True)
-        ]
-        places = {key: place for place, key in enumerate(dict.fromkeys(keys))}
-        added = np.zeros((len(places), amounts.shape[1]))
-        np.add.at(added, [places[key] for key in keys], amounts)
-        last = {key: row for row, key in enumerate(keys)}
-        for key, place in places.items():
-            row = last[key]
-            found[key] = Told(new[row].measure, part, float(stated[row, number]), added[place])
+        stated = sigma[:, part.first]
+        is_set = (np.abs(stated - said[:, number]) <= 1e-9 * stated).tolist()
+        keys = [(source, part.name, one) for source, one in zip(sources, is_set, strict=True)]
+        found.append(Told(part, keys, measures, stated, evidence(left, new, stated, part)))
     return found
 
 
-def _together(told: Mapping[Key, Told], sums: Mapping[Key, Sums], sure: float) -> dict[Key, Told]:
-    """All aircraft whose noise the site file states as one source, but for those that already are known to be off."""
-    found = {}
-    for part in REPORT:
-        chosen = [key for key, one in told.items() if key[2] and one.part is part]
-        if len(chosen) >= TOGETHER_AT_LEAST:
-            added = [told[key].added for key in chosen if sums[key].factor(sure) is None]
-            first = told[chosen[0]]
-            whole = np.sum(added, axis=0) if added else np.zeros_like(first.added)
-            found[ALL, part.name, True] = Told(first.measure, part, first.sigma, whole)
-    return found
-
-
-def _findings(told: Mapping[Key, Told], sums: Mapping[Key, Sums], sure: float) -> list[Finding]:
-    """What is sure of sources that were just heard; of single aircraft only what is not so of all."""
-    found = {}
-    for key, one in told.items():
-        factor = sums[key].factor(sure, TOGETHER_ENOUGH if key[0] == ALL else ENOUGH)
-        least = 0.0 if isinstance(one.measure, Plot) else LASTING
-        if factor is not None and (factor > 1.0 or (key[2] and factor > least)):
-            found[key] = _finding(key, one, factor)
-    for part in REPORT:
-        if (ALL, part.name, True) in found:
-            found = {key: one for key, one in found.items() if key[1:] != (part.name, True) or key[0] == ALL}
-    return list({key[:2]: one for key, one in found.items()}.values())
-
-
-def _forget(sums: dict[Key, Sums], heard: dict[str, int], at: int) -> None:
-    while len(sums) > SOURCES_AT_MOST:
-        oldest = next(iter(sums))
-        del sums[oldest]
-        heard.pop(oldest[0], None)
-    gone = {source for source, last in heard.items() if last < at - FORGOTTEN_NS}
-    if gone:
-        for key in [key for key in sums if key[0] in gone]:
-            del sums[key]
-        for source in gone:
-            del heard[source]
+def _together(
+    told: Told, place: Ints, noises: Mapping[Key, int], sums: Floats, added: Floats, factor: Floats, sure: float
+) -> Finding | None:
+    """All aircraft whose noise the site file states as one source, but for those that are known to be off: into `sums`."""
+    chosen = np.unique(place[[key[2] for key in told.keys]])
+    row = noises.get((ALL, told.part.name, True))
+    if row is None or len(chosen) < TOGETHER_AT_LEAST:
+        return None
+    honest = chosen[np.isnan(factor[chosen])]
+    sums[row] = summed(sums[row : row + 1], added[honest].sum(axis=0, keepdims=True))[0]
+    (found,) = factors(sums[row : row + 1], sure, TOGETHER_ENOUGH).tolist()
+    first = next(row for row, key in enumerate(told.keys) if key[2])
+    return _finding(told, first, (ALL, told.part.name, True), found)
 
 
 def _source(measure: Measure) -> str:
     return f"GPS of {measure.aircraft}" if isinstance(measure, Fix) else f"radar {measure.radar}"
-
-
-def _stated(measure: Measure) -> tuple[float, ...]:
-    """The stated sigma of each part."""
-    return measure.sigma if isinstance(measure, Plot) else (float(measure.sigma_m[0]), measure.velocity_sigma_mps)
 
 
 def _said(measure: Measure, position: PositionSource, radars: Mapping[int, RadarSite]) -> tuple[float, ...]:
@@ -215,9 +197,14 @@ def _said(measure: Measure, position: PositionSource, radars: Mapping[int, Radar
     return radar.range_sigma_m, radar.azimuth_sigma_rad, radar.elevation_sigma_rad
 
 
-def _finding(key: Key, told: Told, factor: float) -> Finding:
+def _finding(told: Told, row: int, key: Key, factor: float) -> Finding | None:
+    """What is said of a noise that is so many times what is stated, if anything."""
     source, name, is_set = key
-    part, stated = told.part, told.sigma / told.part.per_unit
+    part, measure = told.part, told.measures[row]
+    least = 0.0 if isinstance(measure, Plot) else LASTING
+    if not (factor > 1.0 or (is_set and factor > least)):  # NaN too
+        return None
+    stated = float(told.sigma[row]) / part.per_unit
     topic = f"scatter of {name}, {source}"
     text = f"{source}: its {name} scatters {factor:.2g} times as much as "
     if source == ALL:
@@ -226,7 +213,6 @@ def _finding(key: Key, told: Told, factor: float) -> Finding:
         return Finding(
             topic, f"{text}its stream says ({stated:.3g} {part.unit}): tracks are less sure than they are told to be"
         )
-    measure = told.measure
     table = f"the [[radar]] number {measure.radar}" if isinstance(measure, Plot) else "[position]"
     text += f"the stated {stated:.3g} {part.unit}: set {part.key} = {stated * factor:.2g} in {table} of the site file"
     return Finding(topic, text)

@@ -58,50 +58,28 @@ PLOT = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Sum:
-    """One sum of evidence since it was last nothing: its level, how many squares came in, and the sum of their logarithms."""
-
-    level: float = 0.0
-    count: float = 0.0
-    logs: float = 0.0
-
-    def plus(self, evidence: float, count: float, logs: float) -> Sum:
-        """The same with the evidence of some squares."""
-        level = self.level + evidence
-        return Sum(level, self.count + count, self.logs + logs) if level > 0.0 else NOTHING
-
-    @property
-    def factor(self) -> float:
-        """How many times as much as stated it scatters: a mean that single large squares hardly move."""
-        return math.exp(0.5 * (self.logs / max(self.count, 1.0) - LOG_OF_SQUARE))
+def summed(sums: Floats, added: Floats) -> Floats:
+    """Sums (n, 9) with what some measurements told: three sums each, for more than stated, for less by the source itself, and
+    for less by the filter; of each its level, how many squares came in since it was nothing, and the sum of their logarithms.
+    """
+    after = (sums + added).reshape(-1, 3, 3)
+    return np.where(after[:, :, :1] > 0.0, after, 0.0).reshape(-1, 9)
 
 
-NOTHING = Sum()
+def factors(sums: Floats, sure: float, enough: float = ENOUGH) -> Floats:
+    """How many times as much as stated sources scatter, (n,), where evidence is above a level; NaN = as stated, or not sure.
 
-
-@dataclass(frozen=True, slots=True)
-class Sums:
-    """The evidence on one noise: for more than stated, and for less, by the source itself and by the filter."""
-
-    more: Sum = NOTHING
-    less: Sum = NOTHING
-    less_by_filter: Sum = NOTHING
-
-    def plus(self, told: Sequence[float]) -> Sums:
-        """The same with what some measurements told, nine numbers of `evidence`."""
-        return Sums(self.more.plus(*told[0:3]), self.less.plus(*told[3:6]), self.less_by_filter.plus(*told[6:9]))
-
-    def factor(self, sure: float, enough: float = ENOUGH) -> float | None:
-        """How many times as much as stated it scatters, where evidence is above a level; None = as stated, or not sure."""
-        if self.more.level > sure and self.more.count >= enough:
-            return self.more.factor
-        found = [one.factor for one in (self.less, self.less_by_filter) if one.level > sure and one.count >= enough]
-        return min(found, default=None)
+    Of logarithms the mean is taken, which single large squares hardly move.
+    """
+    each = sums.reshape(-1, 3, 3)
+    level, count, logs = each[:, :, 0], each[:, :, 1], each[:, :, 2]
+    found = np.exp(0.5 * (logs / np.maximum(count, 1.0) - LOG_OF_SQUARE))
+    found = np.where((level > sure) & (count >= enough), found, np.nan)
+    return np.asarray(np.where(np.isnan(found[:, 0]), np.fmin(found[:, 1], found[:, 2]), found[:, 0]))
 
 
 def evidence(left: Left, events: Sequence[Event], sigma: Floats, part: Part) -> Floats:
-    """What each of n measurements tells of one part with stated noise (n,): (n, 9), three numbers for each of `Sums`.
+    """What each of n measurements tells of one part with stated noise (n,): (n, 9), to be `summed`.
 
     `left`: what `scatter` leaves over of them. Where that would be disturbed by manoeuvres the filter's innovations take its
     place, as changes from one to the next: by what they should scatter by (S) to find more noise than stated, and by the

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix, Plot
+from gateway.estimators.kalman import VELOCITY
 from gateway.fuse.events import Event
 
 Floats = NDArray[np.float64]
@@ -26,21 +27,81 @@ Bools = NDArray[np.bool_]
 
 # A hard manoeuvre, that lasts: acceleration m/s2, and its first and second derivative by time.
 MANOEUVRE = (3.0, 0.6, 0.1)
+RADARS = 1 << 16  # numbers of radars that a track's groups are told apart by
 CALM = 0.05  # of the noise's variance: no other way is looked for
 # How much of the evidence counts, because measurements that follow each other share noise: for a line through the two
 # before, a parabola through three, and pairs of reports. So that exp(evidence) has a mean of 1 where noise is as stated.
 LINE, PARABOLA, PAIR = 0.52, 0.45, 0.65
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """n measurements of one kind, those of one track and source together and in order of time."""
+    """n measurements of one kind; once `merged`, those of a track and source together and in order of time."""
 
     group: Ints  # (n,) which track and source
-    new: Bools  # (n,) False: only there to be held against
-    at_s: Floats  # (n,)
+    at: Ints  # (n,) ns
     value: Floats  # (n, k): position m and velocity m/s, or range m, azimuth and elevation rad; NaN = not measured
     sigma: Floats  # (n, k) as stated
+    speed_mps: Floats  # (n,) of the track
+    event: Ints  # (n,) which of the new ones it is; -1 = only there to be held against
+
+    @property
+    def at_s(self) -> Floats:
+        """Times (n,) after the first of all."""
+        return np.asarray((self.at - self.at.min()) / SECOND)
+
+    @property
+    def new(self) -> Bools:
+        """Which are new, (n,)."""
+        return np.asarray(self.event >= 0)
+
+    def of(self, chosen: Ints | Bools) -> Rows:
+        """Some of them."""
+        return Rows(
+            self.group[chosen],
+            self.at[chosen],
+            self.value[chosen],
+            self.sigma[chosen],
+            self.speed_mps[chosen],
+            self.event[chosen],
+        )
+
+    def after(self, before: Rows) -> Rows:
+        """Others, and then these."""
+        return Rows(
+            np.concatenate([before.group, self.group]),
+            np.concatenate([before.at, self.at]),
+            np.concatenate([before.value, self.value]),
+            np.concatenate([before.sigma, self.sigma]),
+            np.concatenate([before.speed_mps, self.speed_mps]),
+            np.concatenate([before.event, self.event]),
+        )
+
+    def merged(self, kept: Rows | None) -> Rows:
+        """These, all new, in order behind what was kept of the same groups; what came late or twice is left out."""
+        rows = self if kept is None else self.after(kept)
+        rows = rows.of(np.lexsort((rows.event, rows.at, rows.group)))
+        again = np.zeros(len(rows.at), dtype=np.bool_)
+        again[1:] = (rows.group[1:] == rows.group[:-1]) & (rows.at[1:] == rows.at[:-1])
+        first = _firsts(rows)
+        place = np.arange(len(rows.at))
+        last_kept = np.maximum.reduceat(np.where(rows.new, -1, place), first)
+        late = rows.new & (place < np.repeat(last_kept, np.diff(first, append=len(place))))
+        return rows.of(~(again | late))
+
+    def latest(self, count: int, since: int) -> Rows:
+        """The last ones of each group, so many at most, of groups that were heard since; none of them new any more."""
+        first = _firsts(self)
+        size = np.diff(first, append=len(self.at))
+        from_end = np.repeat(first + size, size) - np.arange(len(self.at))
+        heard = np.repeat(self.at[first + size - 1] >= since, size)
+        rows = self.of((from_end <= count) & heard)
+        return Rows(rows.group, rows.at, rows.value, rows.sigma, rows.speed_mps, np.full(len(rows.at), -1))
+
+
+def _firsts(rows: Rows) -> Ints:
+    """Where each group begins."""
+    return np.flatnonzero(np.append(True, rows.group[1:] != rows.group[:-1])[: len(rows.group)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,14 +117,14 @@ class Left:
         return Left(self.by_noise[rows], self.disturbed[rows], self.share[rows])
 
 
-def rows_of(groups: Sequence[tuple[Sequence[Event], int]]) -> Rows:
-    """The measurements of some groups, each in order with how many of the first were looked at before."""
-    events = [event for group, _ in groups for event in group]
-    group = np.repeat(np.arange(len(groups)), [len(each) for each, _ in groups])
-    new = np.concatenate([np.arange(len(each)) >= known for each, known in groups])
-    at = np.array([event.at for event in events], dtype=np.int64)
+def rows_of(told: Sequence[tuple[int, Event]]) -> Rows:
+    """Measurements of one kind, reports or plots, each with its track; not in order yet."""
+    events = [event for _, event in told]
+    at = np.array([event.measure.at for event in events], dtype=np.int64)
+    source = np.zeros(len(told), dtype=np.int64)
     if isinstance(events[0].measure, Plot):
         plots = [event.measure for event in events if isinstance(event.measure, Plot)]
+        source = np.array([plot.radar for plot in plots], dtype=np.int64)
         value, sigma = np.array([plot.polar for plot in plots]), np.array([plot.sigma for plot in plots])
     else:
         fixes = [event.measure for event in events if isinstance(event.measure, Fix)]
@@ -71,7 +132,9 @@ def rows_of(groups: Sequence[tuple[Sequence[Event], int]]) -> Rows:
         value[[not fix.has_height for fix in fixes], 2] = math.nan
         speed_sigma = np.repeat([[fix.velocity_sigma_mps] for fix in fixes], 3, axis=1)
         sigma = np.concatenate([[fix.sigma_m for fix in fixes], speed_sigma], axis=1)
-    return Rows(group, new, (at - at.min()) / SECOND, value, sigma)
+    group = np.array([track for track, _ in told], dtype=np.int64) * RADARS + source
+    speed_mps = np.sqrt(np.square(np.array([event.mean for event in events])[:, VELOCITY]).sum(axis=1))
+    return Rows(group, at, value, sigma, speed_mps, np.arange(len(told)))
 
 
 def left_of_reports(rows: Rows) -> Left:
@@ -86,12 +149,12 @@ def left_of_reports(rows: Rows) -> Left:
     return left
 
 
-def left_of_plots(rows: Rows, speed_mps: Floats) -> Left:
-    """What is left over of plots, k = 3, of targets that fly at speeds (n,): straight flight bends range and angles too."""
+def left_of_plots(rows: Rows) -> Left:
+    """What is left over of plots, k = 3: straight flight bends range and angles too, more at speed and close by."""
     left = _nothing(rows)
     distance_m = _last_known(rows)
-    bends = MANOEUVRE[0] + 2.0 * speed_mps**2 / distance_m
-    bends_more = MANOEUVRE[1] + 6.0 * speed_mps**3 / distance_m**2
+    bends = MANOEUVRE[0] + 2.0 * rows.speed_mps**2 / distance_m
+    bends_more = MANOEUVRE[1] + 6.0 * rows.speed_mps**3 / distance_m**2
     for known, (component,) in _alike(rows, (0,), (1,), (2,)):
         by = np.ones_like(distance_m) if component == 0 else 1.0 / distance_m
         for size, derivative, share in ((3, bends * by, LINE), (4, bends_more * by, PARABOLA)):

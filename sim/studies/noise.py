@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix, Plot
 from gateway.frames import RadarFrame, RunwayFrame
-from gateway.fuse.consistency import SURE, Consistency
+from gateway.fuse.consistency import Consistency
 from gateway.fuse.events import Event, Job, Measure
 from gateway.fuse.evidence import PLOT, REPORT
 from gateway.fuse.filtering import run as filtered
@@ -198,7 +198,5 @@ def listened(tracks: Sequence[list[Event]], position: PositionSource, radars: di
         for one in findings:
             part = next(name for name in parts if f"scatter of {name}," in one.topic)
             found.setdefault(part, second + 1.0 - told[0][1].at / SECOND)
-        sure = SURE + math.log(max(len(known.sums), 1))
-        levels = [max(one.more.level, one.less.level, one.less_by_filter.level) for one in known.sums.values()]
-        nearest = max(nearest, max(levels, default=0.0) / sure)
+        nearest = max(nearest, float(known.levels.max(initial=0.0)) / known.sure)
     return Heard(found, nearest)

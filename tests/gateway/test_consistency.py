@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,11 +11,11 @@ import numpy as np
 import pytest
 
 from gateway.align import SECOND, Fix
-from gateway.fuse.consistency import PLOT, SOURCES_AT_MOST, Consistency, Finding, Sums
+from gateway.fuse.consistency import NOISES_AT_MOST, PLOT, Consistency, Finding
 from gateway.fuse.events import Event, Job, Measure
-from gateway.fuse.evidence import NOTHING, Sum
+from gateway.fuse.evidence import factors, summed
 from gateway.fuse.filtering import run
-from gateway.fuse.scatter import left_of_plots, left_of_reports, rows_of
+from gateway.fuse.scatter import RADARS, Rows, left_of_plots, left_of_reports, rows_of
 from gateway.fuse.weighting import Model
 from gateway.settings import Options, PositionSource, Site
 
@@ -26,6 +27,11 @@ def _events(world: Any, measures: list[Measure], **options: Any) -> list[Event]:
     return run(
         [Job(1, None, measures, lambda fix: None)], Model.of(Options(**options), PositionSource(), world.radars)
     )[0]
+
+
+def _rows(events: Sequence[Event]) -> Rows:
+    """Measurements of one track in order."""
+    return rows_of([(0, event) for event in events]).merged(None)
 
 
 def _judged(
@@ -73,7 +79,7 @@ def _reports(
 def test_reports_of_right_noise_leave_over_squares_of_one(world: Any, period_s: float) -> None:
     """Position and velocity, by what their stated noise alone would leave over, to 10 % of 3000; a slow source's velocity
     is disturbed by any manoeuvre, and known to be."""
-    rows = rows_of([(_events(world, _reports(world, 1000 * period_s, period_s)[:1000]), 0)])
+    rows = _rows(_events(world, _reports(world, 1000 * period_s, period_s)[:1000]))
     left = left_of_reports(rows)
     assert np.nanmean(left.by_noise[:, :3] ** 2) == pytest.approx(1.0, rel=0.1)
     assert np.nanmax(left.disturbed[3:, :3]) < 0.3
@@ -93,8 +99,7 @@ def test_plots_of_right_noise_leave_over_squares_of_one_also_close_by(world: Any
         gone = "".join(letter for letter in "ae" if random.uniform() < 0.2)
         off = random.normal(0.0, (15.0, 1e-3, 1e-3))
         plots.append(world.plot(course, 0.1 * k, serial=k, off=off, missing=gone))
-    rows = rows_of([(_events(world, plots), 0)])
-    left = left_of_plots(rows, np.full(400, 120.0))
+    left = left_of_plots(_rows(_events(world, plots)))
     for component in range(3):
         kept = left.by_noise[20:, component]
         assert np.nanmean(kept**2) == pytest.approx(1.0, abs=0.2)
@@ -102,11 +107,27 @@ def test_plots_of_right_noise_leave_over_squares_of_one_also_close_by(world: Any
 
 
 def test_only_neighbours_of_one_track_and_source_are_compared(world: Any) -> None:
-    """Two tracks in one array: the first measurements of each have nothing to be held against."""
+    """Two tracks in one array: the first measurements of each have nothing to be held against; what was kept is not new."""
     one, other = (_events(world, _reports(world, 10.0, seed=seed)) for seed in (1, 2))
-    left = left_of_reports(rows_of([(one, 0), (other, 3)]))
-    assert np.isnan(left.by_noise[[0, 10, 11, 12], 0]).all()  # the second's first three were looked at before
+    before = _rows(other[:5]).latest(3, 0)
+    rows = rows_of([*((0, event) for event in one), *((1, event) for event in other[5:])]).merged(
+        replace(before, group=before.group + RADARS)
+    )
+    assert rows.group.tolist() == [0] * 10 + [RADARS] * 8
+    left = left_of_reports(rows)
+    assert np.isnan(left.by_noise[[0, 10, 11, 12], 0]).all()
     assert not np.isnan(left.by_noise[[1, 2, 13], 0]).any()
+
+
+def test_what_comes_late_or_twice_is_left_out(world: Any) -> None:
+    """Out of order within a second measurements are put in order; before what was kept they are not taken any more."""
+    events = _events(world, _reports(world, 12.0))
+    kept = _rows(events[:6]).latest(3, 0)
+    assert kept.at.tolist() == [event.at for event in events[3:6]]
+    rows = _rows([events[8], events[4], events[6], events[6], events[2], events[5]]).merged(kept)
+    assert rows.at.tolist() == [event.at for event in (*events[3:6], events[6], events[8])]
+    assert rows.event.tolist() == [-1, -1, -1, 2, 0]
+    assert not len(kept.latest(3, events[6].at).at)
 
 
 # evidence --------------------------------------------------------------------------------------------------------------
@@ -114,9 +135,14 @@ def test_only_neighbours_of_one_track_and_source_are_compared(world: Any) -> Non
 
 def test_a_sum_of_evidence_that_falls_below_nothing_begins_anew() -> None:
     """It keeps no memory of how long all was well; the factor is that of the squares since then."""
-    assert Sum(2.0, 10.0, 3.0).plus(-2.5, 4.0, 1.0) == NOTHING
-    assert NOTHING.plus(0.5, 3.0, 3.0 * (math.log(2.25) - 1.2704)) == Sum(0.5, 3.0, pytest.approx(-1.378, abs=1e-3))
-    assert NOTHING.plus(0.5, 3.0, 3.0 * (math.log(2.25) - 1.2704)).factor == pytest.approx(1.5, rel=1e-4)
+    log = math.log(2.25) - 1.2704
+    sums = summed(
+        np.array([[2.0, 10.0, 3.0] * 3]), np.array([[-2.5, 4.0, 1.0, 3.0, 190.0, 200.0 * log - 3.0, 0.0, 0.0, 0.0]])
+    )
+    assert sums.tolist() == [[0.0, 0.0, 0.0, 5.0, 200.0, pytest.approx(200.0 * log), 2.0, 10.0, 3.0]]
+    assert factors(sums, 4.0).tolist() == [pytest.approx(1.5, rel=1e-4)]
+    assert np.isnan(factors(sums, 6.0)).all()
+    assert np.isnan(factors(sums, 4.0, enough=300.0)).all()
 
 
 @pytest.mark.parametrize("estimator", ["kalman", "imm", "rmimm", "alpha-beta-gamma"])
@@ -152,8 +178,7 @@ def test_right_noise_is_never_near_being_said(world: Any, period_s: float) -> No
     """Over 600 reports no sum comes within half of the level at which something is said."""
     known, found = _judged(world, [_reports(world, 600.0 * period_s, period_s, seed=7)])
     assert not found
-    for sums in known.sums.values():
-        assert max(sums.more.level, sums.less.level, sums.less_by_filter.level) < 6.0
+    assert known.levels.max() < 0.5 * known.sure
 
 
 def test_turns_are_no_noise(world: Any) -> None:
@@ -199,29 +224,28 @@ def test_aircraft_are_judged_together(world: Any) -> None:
     assert list(found) == ["scatter of position, GPS of mavlink:0"]
 
 
-def test_sources_are_bounded(world: Any) -> None:
+def _known(names: Sequence[str], heard: Sequence[int]) -> Consistency:
+    """What is known of the positions of some aircraft that were heard at some times."""
+    noises = {(f"GPS of {name}", "position", True): row for row, name in enumerate(names)}
+    return Consistency(noises, np.ones((len(names), 9)), np.array(heard, dtype=np.int64))
+
+
+def test_noises_are_bounded() -> None:
     """Those least lately heard are forgotten."""
-    known = {(f"GPS of {name}", "position", True): Sums() for name in range(SOURCES_AT_MOST + 10)}
-    kept, _ = Consistency(known).judged(PositionSource(), {})
-    assert len(kept.sums) == SOURCES_AT_MOST
-    assert ("GPS of 0", "position", True) not in kept.sums
+    names = [str(number) for number in range(NOISES_AT_MOST + 10)]
+    kept, _ = _known(names, range(len(names))).judged(PositionSource(), {})
+    assert len(kept.noises) == len(kept.sums) == len(kept.heard) == NOISES_AT_MOST
+    assert ("GPS of 9", "position", True) not in kept.noises
+    assert kept.noises["GPS of 10", "position", True] == 0
 
 
 def test_what_is_kept_of_a_track_is_bounded_and_forgotten(world: Any) -> None:
     """A few measurements each, for half a minute after the last."""
     known, _ = _judged(world, [_reports(world, 20.0)])
-    assert [len(kept) for kept in known.recent.values()] == [3]
+    assert known.reports is not None
+    assert len(known.reports.at) == 3
     later, _ = known.judged(PositionSource(), {}, world.at(60.0))
-    assert not later.recent
-
-
-def test_late_reports_tell_nothing(world: Any) -> None:
-    """A report that comes after later ones adds nothing to any sum, and changes nothing of what is kept."""
-    events = _events(world, _reports(world, 20.0))
-    known, _ = Consistency().hearing((1, event) for event in events[:10]).judged(PositionSource(), {}, 0)
-    late, _ = known.hearing([(1, events[4])]).judged(PositionSource(), {}, 0)
-    assert late.sums == known.sums
-    assert late.recent == known.recent
+    assert later.reports is None
 
 
 # what is said ----------------------------------------------------------------------------------------------------------
@@ -283,10 +307,7 @@ def test_the_parts_of_a_plot_are_keys_of_the_site_file(world: Any) -> None:
 
 def test_sources_that_are_gone_for_an_hour_are_forgotten() -> None:
     """What is known of a source stays while it is heard, and an hour longer."""
-    known = {(f"GPS of {name}", "position", True): Sums() for name in "ab"}
-    hour = 3_600_000_000_000
-    kept, _ = Consistency(known, heard={"GPS of a": 0, "GPS of b": hour}).judged(
-        PositionSource(), {}, hour + 5 * SECOND
-    )
-    assert list(kept.sums) == [("GPS of b", "position", True)]
-    assert list(kept.heard) == ["GPS of b"]
+    hour = 3600 * SECOND
+    kept, _ = _known("ab", [0, hour]).judged(PositionSource(), {}, hour + 5 * SECOND)
+    assert list(kept.noises) == [("GPS of b", "position", True)]
+    assert kept.heard.tolist() == [hour]
