@@ -1,6 +1,6 @@
 """Makes every picture of README and docs anew: the sessions behind them, then the pictures, in the real viewer.
 
-    python docs/pictures.py                # about a minute; needs what docs/make_pictures.py needs
+    python docs/pictures.py                # some minutes; needs what docs/make_pictures.py needs
 
 Sessions and figures go into a temporary folder; pictures into docs/pictures/.
 """
@@ -17,6 +17,9 @@ OUT = DOCS / "pictures"
 FLIGHT = DOCS.parent / "tests" / "data" / "sitl-landing-excerpt.tlog"
 LOG = FLIGHT.with_suffix(".BIN")
 PROGRAM = Path(sys.executable).with_name("talkdown")
+REGISTERED = ["aircraft=10", "radars=2", "duration_s=420", "gps.error_sigma_m=10"]
+REGISTERED += ["radar1.range_error_m=150", "radar1.azimuth_error_deg=0.5", "radar1.elevation_error_deg=0.2"]
+REGISTERED += ["radar1.time_error_s=0.05", "radar2.range_error_m=-40", "radar2.azimuth_error_deg=-0.2"]
 SCOPE = "Precision approach: elevation over azimuth, x10"
 
 
@@ -51,6 +54,10 @@ def main() -> None:
         landing = only_session(work / "landing") / "session.rrd"
         draw(landing, "landing", "--at", "0.75")
         draw(landing, "scope", "--at", "0.8", "--view", SCOPE)
+        errors = [part for change in REGISTERED for part in ("--set", change)]
+        talkdown("simulate", "traffic", *errors, "--seed", "3", "--speed", "max", "--archive", work / "off")
+        talkdown("replay", only_session(work / "off"), "--viewer", "none", "--archive", work / "registered")
+        draw(only_session(work / "registered") / "session.rrd", "registration", "--at", "0.97", "--page", "Registration")
         site = work / "field.toml"
         site.write_text(talkdown("site", FLIGHT), encoding="utf-8")
         talkdown("simulate", "radar", "--watch", FLIGHT, "--site", site, "--archive", work / "seen")

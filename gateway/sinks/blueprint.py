@@ -73,14 +73,12 @@ def _registration_page(site: Site) -> rrb.Horizontal:
     length = style.units_of(site).length
     units = {"range": length, "azimuth": "degrees", "elevation": "degrees", "time": "ms"}
     errors = [
-        _plot(f"{what.capitalize()} error, {unit}", [f"/register/error/{what}/**"], has_legend=what == "range")
+        _plot(f"{what.capitalize()} error, {unit}", [f"/register/error/{what}/**"], has_legend=False)
         for what, unit in units.items()
     ]
     residuals = [
-        _plot(
-            f"{what.capitalize()}, {unit}: radar less report", [f"/register/residual/{what}/**"], has_legend=not place
-        )
-        for place, (what, unit) in enumerate([*units.items()][:3])
+        _plot(f"{what.capitalize()}, {unit}: radar less report", [f"/register/residual/{what}/**"], has_legend=False)
+        for what, unit in [*units.items()][:3]
     ]
     sources = _plot(f"Errors of position sources, {length}", ["/register/gps/**"], has_legend=False)
     return rrb.Horizontal(

@@ -31,6 +31,10 @@ ODD_RAD = math.radians(
     0.5
 )  # an angle further than this from the others' is not drawn: near the antenna metres are degrees
 VERDICT = "/register/verdict"
+LEGEND = (
+    "Lines: thin is what was found, dim one σ to both sides of it, broad what is taken off.\n\n"
+    "Points, one for each pair: dim as measured, bright with that taken off."
+)
 WHATS = ("range", "azimuth", "elevation", "time")
 
 
@@ -136,7 +140,10 @@ class RegisterScene:
         parts = ["**The position sources are further off than was assumed: nothing of this is to be trusted.**"]
         parts = parts if one.prior_wrong else []
         for row, radar in enumerate(one.radars):
-            lines = [f"| **radar {radar}** | found | σ | taken off |", "|---|--:|--:|--:|"]
+            lines = [
+                f"| **radar {radar}**, {style.radar_colour_name(radar)} | found | σ | taken off |",
+                "|---|--:|--:|--:|",
+            ]
             for place, quantity in enumerate(self._quantities):
                 error, sigma, off = (
                     _number(float(column[row, place]), quantity) for column in (one.error, one.sigma, one.correction)
@@ -151,7 +158,7 @@ class RegisterScene:
             own = f"Each by itself is off by {_number(one.own_sigma_m, length)} {length.unit} an axis besides."
             head = ["| **position sources together** | found | σ |", "|---|--:|--:|"]
             parts.append("\n".join([*head, *common, "", own]))
-        return "\n\n".join(parts)
+        return "\n\n".join([*parts, LEGEND])
 
 
 def _is_odd(time: Ints, angle: Floats) -> Bools:

@@ -44,17 +44,22 @@ LIVES: dict[str, Colour] = {"tentative": TENTATIVE, "confirmed": FUSED, "coastin
 AXES: tuple[Colour, Colour, Colour] = ((235, 110, 90), (110, 200, 110), (110, 150, 240))  # as everywhere: x, y, z
 HORIZONTAL: Colour = (190, 120, 255)
 VERTICAL: Colour = (70, 200, 190)
-RADARS: tuple[Colour, ...] = (
-    RADAR,
-    (90, 215, 150),
-    (200, 130, 255),
-    (255, 205, 90),
-)  # where several are beside each other
+RADARS: tuple[tuple[str, Colour], ...] = (  # where several are beside each other
+    ("blue", RADAR),
+    ("green", (90, 215, 150)),
+    ("violet", (200, 130, 255)),
+    ("yellow", (255, 205, 90)),
+)
 
 
 def radar_colour(radar: int) -> Colour:
     """A radar's, where several are beside each other."""
-    return RADARS[(radar - 1) % len(RADARS)]
+    return RADARS[(radar - 1) % len(RADARS)][1]
+
+
+def radar_colour_name(radar: int) -> str:
+    """What people call it."""
+    return RADARS[(radar - 1) % len(RADARS)][0]
 
 
 def points(size: float) -> float:
