@@ -1,4 +1,4 @@
-"""What several radars alone have of an aircraft, apart from what it says itself: /track/{track} (paper 004, figure 1).
+"""What several radars alone have of an aircraft, apart from what it says itself: /track/radars/{track} (paper 004, figure 1).
 
 A thin blue line beside the orange positions and the red fused track, where two radars or more see an aircraft. With one
 radar its plots are just that.
@@ -68,7 +68,7 @@ class MultiRadarScene:
             for ended in picture.fuse.ended:
                 if self._trails.pop(ended.track, None) is not None:
                     gone, clear = max(ended.at, picture.now), rr.Clear.columns(is_recursive=[True])
-                    entries.append(once(entity("track", ended.track), gone, picture.step, clear))
+                    entries.append(once(_path(ended.track), gone, picture.step, clear))
         return entries
 
     def _look(self, track: int) -> rr.SeriesLines:
@@ -79,4 +79,4 @@ class MultiRadarScene:
 
 
 def _path(track: int) -> str:
-    return entity("track", track)
+    return entity("track", "radars", track)
