@@ -40,6 +40,9 @@ class Part:
     key: str
     unit: str
     per_unit: float = 1.0  # of what is inside for one in the file
+    by_filter: bool = (
+        True  # whether a filter's surprise tells of more noise than stated: of velocities gusts tell the same
+    )
 
     @property
     def components(self) -> slice:
@@ -49,7 +52,7 @@ class Part:
 
 REPORT = (
     Part("position", 0, 3, "sigma_m", "m"),
-    Part("velocity", 3, 6, "velocity_sigma_mps", "m/s"),
+    Part("velocity", 3, 6, "velocity_sigma_mps", "m/s", by_filter=False),
 )
 PLOT = (
     Part("range", 0, 1, "range_sigma_m", "m"),
@@ -90,7 +93,9 @@ def evidence(left: Left, events: Sequence[Event], sigma: Floats, part: Part) -> 
     calm = left.disturbed[:, some] < DISTURBED
     nothing = np.full(own.shape[1], math.nan)
     told = [event.residual for event in events]
-    by_scatter = np.array([nothing if one is None else one.change_by_scatter[some] for one in told])
+    by_scatter = np.array(
+        [nothing if one is None or not part.by_filter else one.change_by_scatter[some] for one in told]
+    )
     change = np.array([nothing if one is None else one.change[some] for one in told]) / sigma[:, None]
     columns = (
         *_counted(np.where(calm, own, np.square(by_scatter)), np.where(calm, share, PAIR), FAR_UP),

@@ -27,6 +27,8 @@ Bools = NDArray[np.bool_]
 
 # A hard manoeuvre, that lasts: acceleration m/s2, and its first and second derivative by time.
 MANOEUVRE = (3.0, 0.6, 0.1)
+GUST_MPS = 0.17  # what level velocities change by in a second, in turbulence
+LEVEL, CLIMB = slice(3, 5), 5  # of a report's components
 RADARS = 1 << 16  # numbers of radars that a track's groups are told apart by
 CALM = 0.05  # of the noise's variance: no other way is looked for
 # How much of the evidence counts, because measurements that follow each other share noise: for a line through the two
@@ -138,7 +140,10 @@ def rows_of(told: Sequence[tuple[int, Event]]) -> Rows:
 
 
 def left_of_reports(rows: Rows) -> Left:
-    """What is left over of reports' positions and velocities, k = 6."""
+    """What is left over of reports' positions and velocities, k = 6.
+
+    Gusts shake velocities like noise does: vertical ones by any amount, and level ones a little.
+    """
     left = _nothing(rows)
     for known, components in _alike(rows, range(3)):
         _pairs(rows, known, components, left)
@@ -146,6 +151,10 @@ def left_of_reports(rows: Rows) -> Left:
         for known, components in _alike(rows, range(3 * first, 3 * first + 3)):
             _differences(rows, _windows(rows, known, 3), components, MANOEUVRE[first], LINE, left)
             _differences(rows, _windows(rows, known, 4), components, MANOEUVRE[first + 1], PARABOLA, left)
+    apart_s = np.append(math.inf, np.diff(rows.at_s))
+    shaken = GUST_MPS * np.clip(apart_s, 0.0, 1.0)[:, None] / rows.sigma[:, LEVEL]
+    left.disturbed[:, LEVEL] += shaken * shaken
+    left.disturbed[:, CLIMB] = math.inf
     return left
 
 
