@@ -48,8 +48,7 @@ class Stopwatch:
     """Watches a live run: for each position and plot, how long after its arrival its picture was with every sink."""
 
     def __init__(self) -> None:
-        self.meter = Meter(None)
-        self.drawn_by: int | None = None
+        self.meter = Meter()
         self.told_ms: list[float] = []
         self._first_ns: int | None = None
 
@@ -58,9 +57,6 @@ class Stopwatch:
         from gateway.observation import GpsReport, RadarPlot
 
         now = time.time_ns()
-        if self.drawn_by is None and run.outputs is not None:
-            self.drawn_by = run.outputs.drawn_by
-            self.meter = Meter(self.drawn_by)
         self.meter(run, picture)
         if picture is None:
             return

@@ -38,6 +38,12 @@ def _answer(target: BinaryIO, sink: RerunSink | None, refused: tuple[Any, ...] |
     target.flush()
 
 
+def _give_way() -> None:
+    """Until now somebody waited for us."""
+    if hasattr(os, "nice"):
+        os.nice(_NICENESS)
+
+
 def draw(source: BinaryIO, target: BinaryIO) -> None:
     """Do what is asked until nothing is asked any more. Raises BrokenPipeError: nobody waits for an answer."""
     sink: RerunSink | None = None
@@ -47,6 +53,7 @@ def draw(source: BinaryIO, target: BinaryIO) -> None:
             if what == "open":
                 site, arguments = about
                 sink = RerunSink(site, **arguments)
+                _give_way()
             else:
                 getattr(sink, what)(*about)
             _answer(target, sink)
@@ -65,8 +72,6 @@ if __name__ == "__main__":
     for _name in ("SIGINT", "SIGTERM", "SIGHUP"):
         if hasattr(signal, _name):
             signal.signal(getattr(signal, _name), signal.SIG_IGN)
-    if hasattr(os, "nice"):
-        os.nice(_NICENESS)
     _told = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what anybody prints is no answer
     try:

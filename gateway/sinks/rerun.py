@@ -31,7 +31,7 @@ from gateway.sinks.scene.sources import SourceScene, raw_positions
 from gateway.sinks.scene.stages import StageScene
 from gateway.sinks.scene.tracks import TrackScene
 
-_ENTITY_NS = 500_000  # of session time for each that is drawn: a crowd takes a quarter of a core
+_ENTITY_NS = 1_000_000  # of session time for each that is drawn: so a crowd takes a fifth of a core
 _CURVES_REST = 4  # of a crowd, curves are drawn so many times less often than what moves
 
 

@@ -150,10 +150,15 @@ def test_a_viewers_port_in_use_is_refused_with_what_to_do(talkdown: Talkdown, si
     assert "give --serve another one" in ended.err.strip().splitlines()[-1]
 
 
-def live(setup: Setup, seconds: float, watch: Callable[[Run, Any], None] = lambda run, picture: None) -> Summary:
+def live(
+    setup: Setup,
+    seconds: float,
+    watch: Callable[[Run, Any], None] = lambda run, picture: None,
+    asked_to_stop: Callable[[], str | None] = lambda: None,
+) -> Summary:
     mavlink, radar = (open_link(Url("udpin", "127.0.0.1")) for _ in range(2))
     with approach_on(mavlink.url.port, radar.url.port):
-        return run_live([mavlink], [radar], setup, seconds=seconds, watch=watch)
+        return run_live([mavlink], [radar], setup, seconds=seconds, watch=watch, asked_to_stop=asked_to_stop)
 
 
 @pytest.fixture
@@ -189,8 +194,8 @@ def test_viewers_that_vanish_in_the_middle_disturb_nothing(place: Place, tmp_pat
         seen.append(port)
 
     setup = Setup(place=place, archive=tmp_path, serve=Serve(), live=True)
-    summary = live(setup, 3.0, connect_and_vanish)
-    assert len(seen) > 10
-    assert summary.ended == "done"
+    summary = live(setup, 30.0, connect_and_vanish, lambda: "the test" if len(seen) > 100 else None)
+    assert len(seen) > 100
+    assert summary.ended == "stopped by the test"
     assert summary.archive is not None
     assert rows(summary.archive) == summary.track_rows > 5
