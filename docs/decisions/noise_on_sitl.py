@@ -31,18 +31,18 @@ SCAN_S = 0.4
 
 def main() -> None:
     """The table: said in so many of the runs, and after how long."""
-    truth = parquet.read_table(Path(sys.argv[1]) / "truth.parquet").to_pydict()
+    truth = parquet.read_table(Path(sys.argv[1]) / "truth.parquet")
     runs = int(sys.argv[2]) if len(sys.argv) > 2 else 3
-    time = np.array([at.value if hasattr(at, "value") else round(at.timestamp() * 1e9) for at in truth["time"]])
-    flying = np.hypot(truth["velocity_east_mps"], truth["velocity_north_mps"]) > 5.0
-    time, at_s = time[flying], (time[flying] - time[flying][0]) / SECOND
-    angles = [np.radians(np.array(truth[name])[flying]) for name in ("latitude_deg", "longitude_deg")]
-    height = np.array(truth["height_m"])[flying]
+    names = ("latitude_deg", "longitude_deg", "height_m", *(f"velocity_{way}_mps" for way in ("east", "north", "up")))
+    known = np.array([truth[name].to_numpy() for name in names], dtype=np.float64)
+    flying = np.hypot(known[3], known[4]) > 5.0  # one of two messages of the truth has no velocity
+    time = truth["time"].to_numpy().astype(np.int64)[flying]
+    known, at_s = known[:, flying], (time - time[0]) / SECOND
+    angles, height, speed = np.radians(known[:2]), known[2], np.ascontiguousarray(known[3:].T)
     runway = Runway(float(angles[0][0]), float(angles[1][0]), float(height[0]), 0.0)
     frame = RunwayFrame(runway)
     radar = replace(DEMO_SITE.radars[0], azimuth_sigma_rad=1e-3, elevation_sigma_rad=1e-3)
     enu = frame.enu_from_geodetic(angles[0], angles[1], height)
-    speed = np.stack([np.array(truth[f"velocity_{way}_mps"])[flying] for way in ("east", "north", "up")], axis=1)
     polar = polar_from_xyz(RadarFrame.of(radar, frame).from_enu(enu))
     position = PositionSource(STATED["position"], 10.0, STATED["velocity"])
     print(f"{'noise':12}{'Hz':>6}{'times':>7}" + "".join(f"{name + ': said, after s':>36}" for name in ESTIMATORS))
