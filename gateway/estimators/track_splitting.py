@@ -45,7 +45,7 @@ class Splitting:
     confirm_at: float = 0.999
     end_below: float = 0.05  # a confirmed track
     drop_below: float = 0.3  # one that is not, in parts of what it began with
-    least_weight: float = 0.05  # of a hypothesis within its family
+    least_weight: float = 0.1  # of a hypothesis within its family
     hypotheses: int = 5  # of a family
     budget: int = 4000  # of all hypotheses
 

@@ -38,6 +38,7 @@ WAITING_AT_MOST = 20_000
 SURE = 0.5  # a plot is told of a family that has it with more than this weight
 SURE_SIGMAS = 4.5  # of a speed: three in a million, because dozens of birds are asked after every scan
 CONFIRM_AT = 0.9999
+LEAST_WEIGHT = 0.05  # of a hypothesis: few targets, so there is time for more of them
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -251,7 +252,14 @@ def _splitting(density: Density, options: Options) -> Splitting:
     level = options.acceleration_sigma_mps2**2 * options.acceleration_time_s
     upright = options.vertical_acceleration_sigma_mps2**2 * options.acceleration_time_s
     speeds = GREATEST_LEVEL_MPS, GREATEST_LEVEL_MPS, GREATEST_CLIMB_MPS
-    return Splitting((level, level, upright), speeds, density.detection, confirm_at=CONFIRM_AT, budget=BUDGET)
+    return Splitting(
+        (level, level, upright),
+        speeds,
+        density.detection,
+        confirm_at=CONFIRM_AT,
+        least_weight=LEAST_WEIGHT,
+        budget=BUDGET,
+    )
 
 
 def _flying(bank: Bank, was: set[int], slowest_mps: float) -> Bank:
