@@ -13,6 +13,7 @@ from gateway.cli import (
     check,
     columns,
     demo,
+    flows,
     live,
     play,
     reconstruct,
@@ -35,7 +36,22 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-_COMMANDS = (demo, live, replay, simulate, play, check, columns, register, reconstruct, score, site, study, sessions)
+_COMMANDS = (
+    demo,
+    live,
+    replay,
+    simulate,
+    play,
+    check,
+    columns,
+    register,
+    reconstruct,
+    flows,
+    score,
+    site,
+    study,
+    sessions,
+)
 for command in _COMMANDS:
     command.register(app)
 

@@ -19,6 +19,7 @@ STUDIES = (
     "clutter",
     "reconstruction",
     "dead-reckoning",
+    "flows",
 )  # the modules of this package that have a `run`, `-` for `_`
 
 Progress = Callable[[str, float], None]  # what is being done, and the share of the whole that is done

@@ -68,7 +68,7 @@ def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
         (["site", "/nowhere/at/all.tlog"], "cannot be read"),
         (["check", "/nowhere/at/all.tlog"], "cannot be read"),
         (["columns", "/nowhere/at/all.tlog", "--out", "x"], "cannot be read"),
-        (["reconstruct", "/nowhere/at/all.tlog"], "cannot be read"),
+        (["reconstruct", "flows", "/nowhere/at/all.tlog"], "cannot be read"),
         (["reconstruct", "x.tlog", "--close-on", "home"], "lift-off, threshold, nothing, or degrees"),
         (["reconstruct", "x.tlog", "--close-on", "threshold"], "--site"),
         (["reconstruct", "x.tlog", "--lift-off", "91,0"], "--lift-off '91,0'"),

@@ -1,0 +1,164 @@
+"""`talkdown flows`: the ways that arrivals took."""
+
+from __future__ import annotations
+
+import json as text
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gateway.cli import options as take
+from gateway.cli.failures import RunError, UsageError
+
+if TYPE_CHECKING:
+    from gateway.offline.flows import Flows, Track
+
+_HELP = """
+Find the flows of many arrivals: which ways they came, how many came that way, how long they took, and who came no way of many.
+
+Recorded ADS-B is read as CSV (also .gz) or Parquet with the columns timestamp, latitude, longitude, altitude (feet), and fid,
+flight_id, callsign or icao24; and so are archived sessions. Flights that do not end low are left out (paper 002-7).
+
+Examples:
+
+  talkdown flows arrivals.csv.gz --airport 49.01,2.55
+
+  talkdown flows sessions/* --method jaccard --archive flows
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("flows", help=_HELP)(flows)
+
+
+def flows(
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="FILE|SESSION ...", help="Recorded ADS-B, archived sessions.", show_default=False),
+    ],
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method",
+            metavar="default|jaccard|literal",
+            help="default compares whole tracks (needs scikit-learn); literal is as printed; jaccard its repair.",
+        ),
+    ] = "default",
+    airport: Annotated[
+        str | None,
+        typer.Option(
+            "--airport",
+            metavar="LAT,LON",
+            help="Where they land, degrees. (default: where most end)",
+            show_default=False,
+        ),
+    ] = None,
+    least: Annotated[
+        int, typer.Option("--least", metavar="N", min=2, help="How many flights make a flow; fewer came alone.")
+    ] = 5,
+    archive: take.ArchiveOption = None,
+    quiet: take.QuietOption = False,
+    json: take.JsonOption = False,
+) -> None:
+    """Find flows."""
+    from gateway.cli.progress import progressing
+    from gateway.offline.flows import METHODS, found
+    from gateway.runtime.arrivals import ArrivalsError, read_arrivals
+    from gateway.runtime.folder import FolderError
+
+    chosen = next((one for one in METHODS if one == method), None)
+    if chosen is None:
+        raise UsageError(f"--method {method!r} is none of {', '.join(METHODS)}.")
+    where = None if airport is None else _read_airport(airport)
+    try:
+        with progressing("reading", show=not quiet) as tell:
+            tracks, where, left_out = read_arrivals(files, where, tell)
+    except (ArrivalsError, FolderError) as error:
+        raise UsageError(str(error)) from error
+    try:
+        result = found(tracks, chosen, least_flights=least)
+    except ModuleNotFoundError as error:
+        raise RunError(
+            "--method default needs scikit-learn, which is not installed: pip install 'talkdown[flows]', or --method jaccard."
+        ) from error
+    if archive is not None:
+        _archive(archive, tracks, result)
+    if json:
+        print(text.dumps(_document(tracks, result, where, left_out)))
+    elif not quiet:
+        _show(tracks, result, where, left_out)
+        if archive is not None:
+            print(f"archived in {archive}; look: rerun {archive / 'flows.rrd'}")
+
+
+def _read_airport(written: str) -> tuple[float, float]:
+    try:
+        latitude, longitude = (float(part) for part in written.split(","))
+    except ValueError:
+        latitude = longitude = math.nan
+    if not (abs(latitude) < 89.0 and abs(longitude) <= 180.0):
+        raise UsageError(f"--airport {written!r} is not understood: write degrees as in 49.01,2.55.")
+    return latitude, longitude
+
+
+def _archive(folder: Path, tracks: tuple[Track, ...], result: Flows) -> None:
+    """memberships.parquet, flows.parquet (mean tracks), flows.rrd."""
+    from gateway.runtime.flow_tables import write_flows
+    from gateway.sinks.flows import draw
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_flows(tracks, result, folder)
+        draw(tracks, result, folder / "flows.rrd")
+    except OSError as error:
+        raise RunError(f"{folder} could not be written: {(error.strerror or str(error)).lower()}.") from error
+
+
+def _document(tracks: tuple[Track, ...], result: Flows, where: tuple[float, float], left_out: int) -> dict[str, Any]:
+    return {
+        "airport_deg": list(where),
+        "flights": len(tracks),
+        "left_out": left_out,
+        "flows": [
+            {
+                "flights": [tracks[flight].name for flight in flow.flights],
+                "mean_time_s": flow.mean_time_s,
+                "time_spread_s": flow.time_spread_s,
+                "lateral_spread_m": float(flow.spread_m[:, 0].mean()),
+                "vertical_spread_m": float(flow.spread_m[:, 1].mean()),
+            }
+            for flow in result.flows
+        ],
+        "alone": [track.name for track, label in zip(tracks, result.labels, strict=True) if label < 0],
+    }
+
+
+def _show(tracks: tuple[Track, ...], result: Flows, where: tuple[float, float], left_out: int) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False)
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for place, heading in enumerate(("flow", "flights", "from", "minutes", "+-", "lateral, m", "vertical, m")):
+        table.add_column(heading, justify="right" if place else "left", no_wrap=True)
+    for number, flow in enumerate(result.flows, 1):
+        east, north = flow.mean_m[0, :2]
+        bearing, distance = math.degrees(math.atan2(east, north)) % 360.0, math.hypot(east, north) / 1000.0
+        numbers = (flow.mean_time_s / 60.0, flow.time_spread_s / 60.0)
+        spreads = flow.spread_m.mean(axis=0)
+        table.add_row(
+            str(number),
+            str(len(flow.flights)),
+            f"{bearing:03.0f} deg, {distance:.0f} km",
+            *(f"{one:.1f}" for one in numbers),
+            *(f"{one:.0f}" for one in spreads),
+        )
+    console.print(table)
+    alone = [track.name for track, label in zip(tracks, result.labels, strict=True) if label < 0]
+    if alone:
+        console.print(f"alone: {', '.join(alone)}")
+    more = f"; {left_out} more did not end low" if left_out else ""
+    console.print(f"{len(tracks)} arrivals about {where[0]:.4f}, {where[1]:.4f}{more}")
