@@ -38,12 +38,13 @@ class Held:
     lasts_s: float
 
 
-def turn_along(noise: Floats, course: Floats, share: Floats, uneven: Ints) -> None:
-    """Turn level noise (n, m, d, d), alike on both axes, along courses (n, 2) of length 1, for the straight modes `uneven`.
+def turn_along(noise: Floats, course: Floats, share: Floats, most: Floats, uneven: Ints) -> None:
+    """Turn level noise (n, m, d, d), alike on both axes, along courses (n, 2) of length 1, for the u straight modes `uneven`.
 
-    There a share (m,) of its sigma is left along the course. A course of 0, of what stands, leaves it alike.
+    There shares (u,) of its sigma are left along the course, and shares (n, u), no less, across it. A course of 0, of what
+    stands, leaves it alike.
     """
-    turned = _turned(course, share[uneven])
+    turned = _turned(course, share, np.maximum(most, share))
     for place, rows in enumerate(_LEVEL[:2]):
         for columns in _LEVEL[: place + 1]:
             block = noise[:, uneven, rows.start, columns.start, None, None] * turned
@@ -71,10 +72,11 @@ def usual(course: Floats, held: Held) -> Floats:
     return held.across_mps2**2 * _turned(course, np.array([held.along_mps2 / held.across_mps2]))[:, 0]
 
 
-def _turned(course: Floats, share: Floats) -> Floats:
-    """The identity (n, m, 2, 2) with variance share^2 along the course, shares (m,)."""
-    along = course[:, None, :, None] * course[:, None, None, :]
-    return np.asarray(np.eye(2) + (share * share - 1.0)[:, None, None] * along)
+def _turned(course: Floats, along: Floats, across: Floats | float = 1.0) -> Floats:
+    """Variances (n, m, 2, 2) of which sigma is a share (m,) along the course and a share (n, m) across it."""
+    way = course[:, None, :, None] * course[:, None, None, :]
+    square = np.asarray(across * across)[..., None, None]
+    return np.asarray(square * np.eye(2) + ((along * along)[:, None, None] - square) * way)
 
 
 def _response(elapsed_s: Floats, lasts_s: float) -> tuple[Floats, Floats, Floats]:

@@ -15,7 +15,7 @@ from gateway.estimators.kalman import POSITION
 Floats = NDArray[np.float64]
 
 FADE = 0.88  # of the mean, over a second
-USUAL = 5.0  # of three degrees of freedom: a mean as large as this is noise's
+USUAL = 6.0  # of three degrees of freedom: a mean as large as this is noise's
 
 
 def faded(

@@ -70,7 +70,8 @@ class Mode:
     """One way of moving. `turn` is a multiple of the set's turn rate: 0 is straight, positive to the left.
 
     `share` is how much of its time an aircraft spends so, against the other modes'; `along`, of a straight one, how much of
-    the level noise's sigma there is along the course, 1 = as much as across; with `holds` an acceleration lasts.
+    the level noise's sigma there is along the course, 1 = as much as across; with `holds` an acceleration lasts. Across the
+    course a slow aircraft has no more than the set's turn rate makes of its speed.
     """
 
     turn: float
@@ -86,8 +87,9 @@ class Numbers:
 
     turn: Floats
     share: Floats  # in all 1
-    along: Floats
-    uneven: Ints  # the places of modes whose noise is not alike along and across
+    uneven: Ints  # the places of the u modes whose noise is not alike along and across
+    along: Floats  # (u,) of these
+    across: Floats  # (u,) m/s2
     holds: Bools
     shaken: Shaken
 
@@ -95,13 +97,15 @@ class Numbers:
     def of(cls, modes: Sequence[Mode]) -> Numbers:
         """The modes' own numbers."""
         share, along = np.array([mode.share for mode in modes]), np.array([mode.along for mode in modes])
+        uneven, shaken = np.flatnonzero(along != 1.0), Shaken.of([mode.motion for mode in modes])
         return cls(
             np.array([mode.turn for mode in modes]),
             share / share.sum(),
-            along,
-            np.flatnonzero(along != 1.0),
+            uneven,
+            along[uneven],
+            np.sqrt(shaken.level[uneven]),
             np.array([mode.holds for mode in modes]),
-            Shaken.of([mode.motion for mode in modes]),
+            shaken,
         )
 
 
@@ -208,11 +212,13 @@ def predict(mixture: Mixture, elapsed_s: Floats, modes: Modes, transition: Float
 def moved(mean: Floats, weight: Floats, elapsed_s: Floats, modes: Modes) -> tuple[Floats, Floats]:
     """Transition and noise (n, m, d, d) over times (n,) of modes that have mixed: means (n, m, d), weights (n, m)."""
     level = (weight[:, None, :] @ mean[:, :, 3:5])[:, 0]
-    rate = modes.turn_rate(np.sqrt(level[:, 0] * level[:, 0] + level[:, 1] * level[:, 1]))
+    speed = np.sqrt(level[:, 0] * level[:, 0] + level[:, 1] * level[:, 1])
+    rate = modes.turn_rate(speed)
     numbers, held = modes.numbers, modes.acceleration
     carry, noise = carried(numbers.shaken, elapsed_s, rate, SIZE if held is None else WIDE)
     if len(numbers.uneven):
-        turn_along(noise, _course(level), numbers.along, numbers.uneven)
+        slow = np.minimum(speed[:, None] * modes.turn_rate_rps / numbers.across, 1.0)
+        turn_along(noise, _course(level), numbers.along, slow, numbers.uneven)
     if held is not None:
         add_held(carry, noise, elapsed_s, _course(level), held, numbers.holds)
     return carry, noise

@@ -85,7 +85,7 @@ class Estimation:
     """
 
     calm_acceleration_mps2: float = 0.15  # along the course and upright
-    calm_across_acceleration_mps2: float = 1.0  # courses wander more than speeds
+    calm_across_acceleration_mps2: float = 3.0  # courses wander more than speeds
     lasting_acceleration_mps2: float = 0.15  # along the course: braking
     lasting_across_acceleration_mps2: float = 1.0  # swinging onto a course
     lasting_for_s: float = 40.0
@@ -95,9 +95,9 @@ class Estimation:
     turn_rate_rps: float = math.radians(3.0)
     bank_rad: float = math.radians(25.0)  # slow aircraft turn faster: as a level turn at this bank
     calm_share: float = 50.0
-    lasting_share: float = 60.0
-    manoeuvre_share: float = 4.0
-    turn_share: float = 12.0  # both sides together
+    lasting_share: float = 80.0
+    manoeuvre_share: float = 6.0
+    turn_share: float = 20.0  # both sides together
     mode_lasts_s: float = 9.0  # mean time until the mode is drawn anew, by the shares
 
 

@@ -72,8 +72,11 @@ def run(runs: int = 100, seed: int = 1, *, rrd: Path | None = None, progress: Pr
     drawn: dict[str, Seconds] = {}
     for place, (name, ensembles) in enumerate(cases.items()):
         for turn, estimator in enumerate(ESTIMATORS):
-            progress(f"{name}, {estimator}", (place + turn / len(ESTIMATORS)) / len(cases))
-            each = [(one, follow(one, model_of(one, Options(estimator=estimator)))) for one in ensembles]
+            each = []
+            for number, one in enumerate(ensembles):
+                done = (turn + number / len(ensembles)) / len(ESTIMATORS)
+                progress(f"{name}, {estimator}", (place + done) / len(cases))
+                each.append((one, follow(one, model_of(one, Options(estimator=estimator)))))
             found = joined([by_second(followed, one) for one, followed in each])
             drawn[f"{name}/{estimator}"] = found
             rows.append((name, estimator, *_cells(found), _rmse_m(each)))
