@@ -19,21 +19,21 @@ def joined(lanes: Lanes, spans: Spans, tracks: RadarTracks, at: int) -> tuple[La
     hosted: dict[str, list[Joint]] = {}
     for joint in lanes.joints:
         hosted.setdefault(joint.name, []).append(joint)
-    for lane in list(lanes.lanes.values()):
+    for track in list(lanes.lanes):
+        lane = lanes.lanes[track]
         if lane.key is None:
             continue
         to = joined_at(lane, spans, hosted.get(lane.name, ()), tracks, at)
         if (to[0] if to else None) == lane.ended_at:
             continue
         lanes = _with_number(lanes, lane, None)
-        if to is not None:
-            host = lanes.lanes[lanes.track_of(to[1]) or 0]
-            former = host.number
+        host = None if to is None else lanes.lanes.get(lanes.track_of(to[1]) or 0)
+        if to is not None and host is not None:
             lanes = _with_number(lanes, lane, (to[0], host))
             stays = lanes.lanes[host.track].number
             if lane.ended_at is None:
-                gone = former if stays == lane.number else lane.number
-                same = to[1] if to[1] in lanes.by_aircraft else "the same target"
+                gone = host.number if stays == lane.number else lane.number
+                same = host.aircraft or "the same target"
                 ended.append(Ended(to[0], gone, f"joined track {stays}, {same}", into=stays))
         lanes = lanes.with_lane(replace(lane, ended_at=to[0] if to else None))
     return lanes, ended
