@@ -10,19 +10,22 @@ from numpy.typing import NDArray
 
 from gateway.picture import Picture
 from gateway.sinks.scene import style
-from gateway.sinks.scene.entry import Always, Entry, entity, rows
+from gateway.sinks.scene.entry import Always, Entry, entity, once, rows
 from gateway.track import Look
 
 Floats = NDArray[np.float64]
 
+DRAWN = ("hypotheses", "confirmed", "taken")
+SILENT_NS = 15_000_000_000
 FAINTEST, STRONGEST = 24.0, 200.0  # of 255: a hypothesis of likelihood 0, and of 1
 
 
 class ClutterScene:
-    """Draws what is thought of unnumbered plots; remembers which radars were drawn before."""
+    """Draws what is thought of unnumbered plots; remembers which radars are drawn, and when each was last."""
 
     def __init__(self) -> None:
         self._known: set[int] = set()
+        self._drawn: dict[int, int] = {}
 
     def entries(self, pictures: Sequence[Picture]) -> list[Entry]:
         """What these pictures add, radar by radar, in order of time."""
@@ -37,6 +40,17 @@ class ClutterScene:
                 self._known.add(radar)
                 found += self._looks(radar)
             found += _drawn(radar, some)
+            self._drawn[radar] = some[-1][0].at
+        return [*found, *self._silent(pictures[-1])] if pictures else found
+
+    def _silent(self, picture: Picture) -> list[Entry]:
+        """Of a radar that has fallen silent nothing is left in the scene."""
+        silent = [radar for radar, at in self._drawn.items() if picture.now - at > SILENT_NS]
+        found: list[Entry] = []
+        for radar in silent:
+            del self._drawn[radar]
+            clear = rr.Clear.columns(is_recursive=[False])
+            found += [once(_path(radar, what), picture.now, picture.step, clear) for what in DRAWN]
         return found
 
     def _looks(self, radar: int) -> list[Entry]:

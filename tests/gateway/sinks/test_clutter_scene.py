@@ -40,7 +40,10 @@ def picture(pictures: Callable[[float], list[Picture]]) -> Picture:
 def drawn(picture: Picture) -> dict[str, Rows]:
     """Rows by the last part of their path."""
     scene = ClutterScene()
-    scans = [looked(picture, look(10, [0.9, 1.0, 0.0], ("1/100001", "", ""))), looked(picture, look(20, [0.5], ("",)))]
+    scans = [
+        looked(picture, look(picture.now - 10, [0.9, 1.0, 0.0], ("1/100001", "", ""))),
+        looked(picture, look(picture.now, [0.5], ("",))),
+    ]
     return {one.path.rpartition("/")[2]: one for one in scene.entries(scans) if not isinstance(one, Always)}
 
 
@@ -59,3 +62,11 @@ def test_confirmed_tracks_have_their_names(picture: Picture) -> None:
 def test_plots_that_were_taken_and_have_a_place_are_drawn(picture: Picture) -> None:
     """One a scan here: the other has no place."""
     assert [len(row) for row in column(drawn(picture)["taken"], "positions")] == [1, 1]
+
+
+def test_of_a_silent_radar_nothing_is_left(picture: Picture) -> None:
+    """Fifteen seconds after its last scan what was drawn of it is cleared, once."""
+    scene = ClutterScene()
+    scene.entries([replace(looked(picture, look(picture.now, [0.5], ("",))), now=picture.now)])
+    later = [replace(picture, now=picture.now + seconds * 10**9) for seconds in (10, 16, 30)]
+    assert [len(scene.entries([one])) for one in later] == [0, 3, 0]
