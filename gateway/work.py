@@ -37,8 +37,10 @@ class Work(Tracking):
         if self.now is None or now < self.now - self.history:
             self._start_again(now)
         due = self._next_check()
-        while (at := min(self.instant, due)) < now or (at == now and watermark):
+        while (at := min(self.instant, due, self.predicting.due)) < now or (at == now and watermark):
             self.now = max(at, self.now or at)
+            if at == self.predicting.due:
+                self._foretell(at)
             self._track_due()
             self._check_due()
             if at == self.instant:
@@ -133,6 +135,7 @@ class Work(Tracking):
         self.tracks, self.association = RadarTracks(), Association()
         self.unnumbered = self.unnumbered.emptied()
         self.registration = self.registration.again(now)
+        self.predicting = self.predicting.planning((), now)
         # An arrival stamped at a whole second comes before what happens at that second.
         self.now, self.instant = now, (now - 1) // SECOND * SECOND + SECOND
 
@@ -234,20 +237,31 @@ class Work(Tracking):
     # predict ------------------------------------------------------------------------------------------------------
 
     def predict(self, at: int) -> None:
-        """Where every track will be."""
+        """Where every track will be: of many, each part's at its own instant within the second."""
         alive = self._alive()
         if alive and at % int(self.options.prediction_period_s * SECOND) == 0:
-            self.predicting, made = predict.forecast(
-                self.predicting,
-                alive,
-                at,
-                self.options.horizons_s,
-                self.model,
-                self.site,
-                self.frame,
-                self.geoid.separation_m,
-            )
-            self.forecasts.append(made)
+            self.predicting = self.predicting.planning([lane.track for lane in alive], at)
+            self._foretell(at)
+
+    def _foretell(self, at: int) -> None:
+        """The predictions that are due."""
+        self._settle()
+        self.predicting, tracks = self.predicting.begun(at)
+        lanes = (self.lanes.lanes.get(track) for track in tracks)
+        alive = [lane for lane in lanes if lane is not None and lane.ended_at is None and lane.events]
+        if not alive:
+            return
+        self.predicting, made = predict.forecast(
+            self.predicting,
+            alive,
+            at,
+            self.options.horizons_s,
+            self.model,
+            self.site,
+            self.frame,
+            self.geoid.separation_m,
+        )
+        self.forecasts.append(made)
 
     # fuse ---------------------------------------------------------------------------------------------------------
 

@@ -91,7 +91,8 @@ class _Path:
     time_s: Floats
     turned: Floats
     horizons: Floats
-    at: Floats
+    east_at: Floats
+    north_at: Floats
     course_at: Floats
     turned_at: Floats
     passed_at: Floats
@@ -100,7 +101,7 @@ class _Path:
     def at_start(cls, position: Floats, course: Floats, horizons: Floats) -> _Path:
         """A path of no length."""
         nothing, zero = np.zeros(len(course)), np.zeros(horizons.shape)
-        return cls(position, course, nothing, nothing, horizons, np.zeros((*zero.shape, 2)), zero, zero, zero)
+        return cls(position, course, nothing, nothing, horizons, zero, zero, zero, zero, zero)
 
     def extend(self, speed: Floats, rate: Floats, duration_s: Floats, passed: int) -> None:
         """Fly on with these ground speeds and turn rates (n,) for so long (n,); all later horizons are on it so far."""
@@ -109,8 +110,8 @@ class _Path:
         chord, bend = _arc(rate[:, None] * since)
         middle = self.course[:, None] + bend
         length = speed[:, None] * since * chord
-        there = self.position[:, None] + np.stack([length * np.cos(middle), length * np.sin(middle)], axis=-1)
-        self.at = np.where(on[..., None], there, self.at)
+        self.east_at = np.where(on, self.position[:, 0, None] + length * np.cos(middle), self.east_at)
+        self.north_at = np.where(on, self.position[:, 1, None] + length * np.sin(middle), self.north_at)
         self.course_at = np.where(on, self.course[:, None] + 2.0 * bend, self.course_at)
         self.turned_at = np.where(on, self.turned[:, None] + np.abs(2.0 * bend), self.turned_at)
         self.passed_at = np.where(on, float(passed), self.passed_at)
@@ -128,9 +129,8 @@ class _Path:
         on = self.horizons >= self.time_s[:, None]
         moving = np.minimum(since, (speed / np.maximum(braking, 1e-9))[:, None])
         length = speed[:, None] * moving - 0.5 * braking[:, None] * moving * moving
-        way = np.stack([np.cos(self.course), np.sin(self.course)], axis=-1)
-        there = self.position[:, None] + length[..., None] * way[:, None]
-        self.at = np.where(on[..., None], there, self.at)
+        self.east_at = np.where(on, self.position[:, 0, None] + length * np.cos(self.course)[:, None], self.east_at)
+        self.north_at = np.where(on, self.position[:, 1, None] + length * np.sin(self.course)[:, None], self.north_at)
         self.course_at = np.where(on, self.course[:, None], self.course_at)
         self.turned_at = np.where(on, self.turned[:, None], self.turned_at)
         self.passed_at = np.where(on, float(passed), self.passed_at)
@@ -216,7 +216,7 @@ def ahead(
     on.extend(speed, now.turn_rate, np.zeros(n), 0)
     chosen = follows[:, None]
     return Ahead(
-        np.where(chosen[..., None], path.at, on.at),
+        np.stack([np.where(chosen, path.east_at, on.east_at), np.where(chosen, path.north_at, on.north_at)], axis=-1),
         np.where(chosen, path.course_at, on.course_at),
         np.where(chosen, path.turned_at, on.turned_at),
         np.where(chosen, path.passed_at, 0.0),

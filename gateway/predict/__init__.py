@@ -5,8 +5,8 @@ is what is remembered of each track meanwhile; `forecasting` is one round of pre
 dimension and their sigmas, `table` the columns.
 """
 
-from gateway.predict.forecasting import Predicting, forecast
+from gateway.predict.forecasting import TOGETHER, Predicting, forecast
 from gateway.predict.table import Forecast, Predicted, table
 from gateway.predict.told import Said
 
-__all__ = ["Forecast", "Predicted", "Predicting", "Said", "forecast", "table"]
+__all__ = ["TOGETHER", "Forecast", "Predicted", "Predicting", "Said", "forecast", "table"]

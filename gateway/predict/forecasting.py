@@ -35,6 +35,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+TOGETHER = 100  # tracks that are predicted at once; of more, each part has its own instant within the second
+NEVER = 1 << 62
 NONE, INFERRED, DECLARED_KIND = 0, 1, 2
 TRUSTED = 0.5  # a declared goal with this trust is flown to
 WIND_WITHIN = 60 * SECOND  # a wind told this lately is still so
@@ -54,6 +56,25 @@ class Predicting:
     remembered: Remembered = field(default_factory=Remembered)
     goals: Mapping[str | None, Goals] = field(default_factory=dict)  # by aircraft; None: of those that said nothing
     separation_m: float = 0.0  # of the geoid, as the goals have it
+    planned: tuple[tuple[int, tuple[int, ...]], ...] = ()  # when which tracks are predicted next
+
+    @property
+    def due(self) -> int:
+        """When the next tracks are predicted."""
+        return self.planned[0][0] if self.planned else NEVER
+
+    def planning(self, tracks: Sequence[int], at: int) -> Predicting:
+        """The same with a round of predictions of these tracks, the first at an instant, the others within the second."""
+        parts = [tuple(tracks[first : first + TOGETHER]) for first in range(0, len(tracks), TOGETHER)]
+        return replace(
+            self, planned=tuple((at + place * SECOND // len(parts), part) for place, part in enumerate(parts))
+        )
+
+    def begun(self, at: int) -> tuple[Predicting, tuple[int, ...]]:
+        """The same without the part that is due at an instant, and its tracks."""
+        if self.due > at:
+            return self, ()
+        return replace(self, planned=self.planned[1:]), self.planned[0][1]
 
     def hearing(self, said: Said) -> Predicting:
         """The same with one thing more that an aircraft said."""

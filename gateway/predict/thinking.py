@@ -23,11 +23,13 @@ STALE_S = 10.0  # after a gap as long as this the course begins anew
 RATE_MEMORY_S = 1.5  # of the turn rate that is measured from the course
 LEAST_RATE_RPS = math.radians(0.75)  # a slower turn is none
 SURE_SIGMAS = 3.0
+STILL_THERE_RAD = math.radians(12.0)  # sigma of the course now about the direction to an inferred point
 SPEED_SIGMAS = 1.5
 WANDER_MEMORY_S, WANDERS_LESS = (
     20.0,
     3.0,
 )  # a filter's velocity is wrong by no more than so often what it changes by in a second
+SURE_AT_MOST = 0.25  # but by no less than this share of what the filter says
 UNSETTLED_S = 8.0  # how long a turn is felt
 
 REACTS_S = 6.0  # after a new goal was declared the aircraft has this long to begin to turn
@@ -112,7 +114,7 @@ def motions(
         wander=wander,
         unsettled=unsettled,
     )
-    turn_rate, sure = np.where(side == 0, 0.0, rate), np.minimum(velocity_sigma, steady)
+    turn_rate, sure = np.where(side == 0, 0.0, rate), np.clip(steady, SURE_AT_MOST * velocity_sigma, velocity_sigma)
     return Motions(position, velocity, speed, course, side, turn_rate, usual_rate, gained, sure, unsettled), minds
 
 
@@ -133,6 +135,9 @@ def inferred(
     seen, by_course = intent.seen(before.seen, off, now.side, elapsed_s, INFERENCE)
     time_s = intent.time_to_go(now.position, now.velocity, places)
     weight = by_course * intent.by_time(time_s, planned, INFERENCE) * lowered
+    # what was agreed on for long is forgotten slowly; who flies elsewhere now does not go there
+    here = np.where((now.side == 0)[:, None], np.exp(-0.5 * (off / STILL_THERE_RAD) ** 2), 1.0)
+    weight = weight * here
     weight = np.where((now.speed < LEAST_SPEED_MPS)[:, None], math.nan, weight)
     return seen, intent.believed(weight, off, INFERENCE), off
 

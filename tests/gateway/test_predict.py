@@ -1,0 +1,183 @@
+"""Predictions of live tracks: where plans, declared points and published ones lead, and what happens when they are not kept."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gateway.observation import AirData, FlightPlan, GpsReport, Heard, Intent, Observation, PlanPoint
+from gateway.picture import Picture
+from gateway.pipeline import initial, step
+from gateway.predict import TOGETHER, Predicting
+from gateway.predict.told import Tellings
+from gateway.settings import DEMO_SITE, Options, Site, Waypoint
+
+SECOND = 1_000_000_000
+T0 = 1_790_000_000 * SECOND
+LATITUDE, LONGITUDE = math.radians(31.3), math.radians(104.3)  # 40 km from the runway
+NORTH_RAD = 1.0 / 6_362_000.0
+EAST_RAD = 1.0 / (6_386_000.0 * math.cos(LATITUDE))
+SPEED = 60.0
+OPTIONS = Options(horizons_s=(10.0, 60.0))
+AIRCRAFT = "mavlink:1"
+
+
+def place(east_m: float, north_m: float) -> tuple[float, float]:
+    return LATITUDE + north_m * NORTH_RAD, LONGITUDE + east_m * EAST_RAD
+
+
+def report(at_s: float, east_m: float, north_m: float, course_deg: float) -> GpsReport:
+    at = T0 + round(at_s * SECOND)
+    velocity = SPEED * math.sin(math.radians(course_deg)), SPEED * math.cos(math.radians(course_deg)), 0.0
+    there = place(east_m, north_m)
+    return GpsReport(AIRCRAFT, at, at, *there, 1000.0, None, *velocity, 3.0, 5.0, 0.3)
+
+
+def northward(seconds: int) -> list[GpsReport]:
+    """A report each half second."""
+    return [report(half / 2, 0.0, SPEED * half / 2, 0.0) for half in range(2 * seconds)]
+
+
+def plan(*points: tuple[float, float], at_s: float = 0.0) -> FlightPlan:
+    items = [PlanPoint(k, "waypoint", *place(*point), altitude_msl_m=1000.0) for k, point in enumerate(points, 1)]
+    return FlightPlan(AIRCRAFT, T0 + round(at_s * SECOND), T0 + round(at_s * SECOND), tuple(items))
+
+
+def goes_to(sequence: int, at_s: float = 0.0, told_by: str = "mission") -> Intent:
+    at = T0 + round(at_s * SECOND)
+    return Intent(AIRCRAFT, at, at, told_by, sequence)
+
+
+def run(
+    said: Sequence[Observation], site: Site = DEMO_SITE, together: int = 1, options: Options = OPTIONS
+) -> list[Picture]:
+    """What was said, in the order in which it was heard, some arrivals a tick; and a watermark at the end."""
+    ordered = sorted(said, key=lambda one: one.received_at)
+    heard = [Heard(one.received_at + place, (one,)) for place, one in enumerate(ordered)]
+    heard.append(Heard(heard[-1].now + 1))
+    state, pictures = initial(site, options), []
+    for first in range(0, len(heard), together):
+        state, picture = step(state, heard[first : first + together])
+        pictures.append(picture)
+    return pictures
+
+
+def rows(
+    pictures: Sequence[Picture], horizon_s: float = 60.0
+) -> list[tuple[float, str, str | None, str | None, float]]:
+    """Of each second: when, method, intent, kind, confidence."""
+    found = []
+    for one in (picture.predict for picture in pictures):
+        for row in np.flatnonzero(one.horizon_s == horizon_s).tolist():
+            made_s = (int(one.made[row]) - T0) / SECOND
+            found.append((made_s, one.method[row], one.intent[row], one.intent_kind[row], float(one.confidence[row])))
+    return found
+
+
+def ahead(pictures: Sequence[Picture]) -> tuple[float, float]:
+    """East and north of the last point foretold for 60 s, from where all begins."""
+    last = [picture.predict for picture in pictures if len(picture.predict.made)][-1]
+    row = int(np.flatnonzero(last.horizon_s == 60.0)[-1])
+    return (last.longitude_rad[row] - LONGITUDE) / EAST_RAD, (last.latitude_rad[row] - LATITUDE) / NORTH_RAD
+
+
+def test_a_declared_point_of_the_plan_leads_round_the_corner() -> None:
+    """Northward to a corner 3 km ahead and then east: in 60 s it is on the eastern leg, and says why."""
+    pictures = run([plan((0.0, 3000.0), (6000.0, 3000.0)), goes_to(1), *northward(25)])
+    _, method, name, kind, confidence = rows(pictures)[-1]
+    assert (method, name, kind) == ("two segments", "waypoint 1", "declared")
+    assert confidence > 0.9
+    east, north = ahead(pictures)
+    assert north == pytest.approx(3000.0, abs=30.0)
+    assert 2000.0 < east < 2500.0  # 84 s at 60 m/s, less 3000 m, and a little for the corner that is cut
+
+
+def test_a_vehicle_that_leaves_its_plan_is_not_believed_for_longer_than_ten_seconds() -> None:
+    """It is said to go east from the corner and flies on northward: confidence falls, and the model's prediction is back."""
+    said = [plan((0.0, 1500.0), (6000.0, 1500.0)), goes_to(1), goes_to(2, 24.0), *northward(45)]
+    told = rows(run(said))
+    before = [one for one in told if 10.0 < one[0] < 24.0]
+    assert all(one[1] == "two segments" for one in before)
+    after = [one for one in told if one[0] >= 35.0]
+    assert after
+    assert all(one[1] == "model" and one[4] < 0.5 for one in after)
+    assert all(one[2] == "waypoint 2" for one in after)
+
+
+@pytest.mark.parametrize("goal", [(0.0, -20_000.0), (30_000.0, 0.0)])
+def test_a_wrong_plan_is_found_out(goal: tuple[float, float]) -> None:
+    """A plan that leads behind or aside of the way that is flown is doubted within ten seconds, and flown no more."""
+    told = rows(run([plan(goal), goes_to(1), *northward(20)]))
+    assert all(one[1] == "model" and one[4] < 0.5 for one in told if one[0] >= 11.0)
+
+
+def test_a_mission_uploaded_in_flight_takes_the_place_of_the_old_one() -> None:
+    """From the second on in which the new plan is heard its point is the one flown to."""
+    old, new = plan((0.0, 20_000.0)), plan((0.0, 9000.0), (5000.0, 9000.0), at_s=12.0)
+    pictures = run([old, goes_to(1), new, goes_to(1, 12.0), *northward(25)])
+    east, north = ahead(pictures)
+    assert rows(pictures)[-1][1:4] == ("two segments", "waypoint 1", "declared")
+    assert (east, north) == (pytest.approx(0.0, abs=20.0), pytest.approx(24 * SPEED + 60 * SPEED, abs=60.0))
+
+
+def test_what_was_said_earlier_but_heard_later_changes_nothing() -> None:
+    """Plans and intents count by when they were valid."""
+    newer, older = goes_to(2, 5.0), replace(goes_to(1, 1.0), received_at=T0 + 8 * SECOND)
+    tellings = Tellings().hearing(newer).hearing(older)
+    assert tellings.by_aircraft[AIRCRAFT].declared == newer
+
+
+def test_an_operator_is_believed_before_the_vehicle_until_withdrawn() -> None:
+    """A point that a person declares overrides the mission's; one without a goal takes it back."""
+    ordered = Intent(AIRCRAFT, T0, T0, "operator", latitude_rad=0.5, longitude_rad=1.8)
+    tellings = Tellings().hearing(goes_to(3, 5.0)).hearing(ordered)
+    assert tellings.by_aircraft[AIRCRAFT].declared == ordered
+    withdrawn = tellings.hearing(Intent(AIRCRAFT, T0 + SECOND, T0 + SECOND, "operator"))
+    assert withdrawn.by_aircraft[AIRCRAFT].declared == goes_to(3, 5.0)
+
+
+def test_a_published_point_ahead_is_inferred() -> None:
+    """Without any plan the published point that is flown at is told as inferred; one aside is not."""
+    points = (Waypoint("ABEAM", *place(8000.0, 8000.0)), Waypoint("AHEAD", *place(0.0, 9000.0)))
+    told = rows(run(northward(20), replace(DEMO_SITE, waypoints=points)))
+    assert told[-1][1:4] == ("two segments", "AHEAD", "inferred")
+    assert told[-1][4] > 0.8
+
+
+def test_without_any_goal_there_is_the_model_and_no_intent() -> None:
+    """No plan, no published point, far from the runway: straight on, and nobody pretends."""
+    pictures = run(northward(12))
+    _, method, name, kind, confidence = rows(pictures)[-1]
+    assert (method, name, kind) == ("model", None, None)
+    assert math.isnan(confidence)
+    assert ahead(pictures) == (pytest.approx(0.0, abs=20.0), pytest.approx(71 * SPEED, abs=40.0))
+
+
+def test_how_arrivals_fall_into_ticks_changes_no_bit() -> None:
+    """Plans, intents and winds among the reports: ticks of one arrival and one of everything foretell the same."""
+    wind = [
+        AirData(AIRCRAFT, T0 + k * SECOND, T0 + k * SECOND, wind_east_mps=4.0, wind_north_mps=1.0) for k in range(9)
+    ]
+    said = [plan((0.0, 900.0), (4000.0, 900.0)), goes_to(1), goes_to(2, 14.0), *wind, *northward(20)]
+    columns = ("made", "latitude_rad", "longitude_rad", "height_m", "sigma_along_m", "sigma_across_m", "confidence")
+    one, all_at_once = (
+        [np.concatenate([getattr(picture.predict, name) for picture in run(said, together=count)]) for name in columns]
+        for count in (1, 1000)
+    )
+    assert len(one[0]) == 38
+    assert all(left.tobytes() == right.tobytes() for left, right in zip(one, all_at_once, strict=True))
+
+
+def test_many_tracks_are_predicted_part_by_part_within_the_second() -> None:
+    """Of 250 tracks three parts, each at its own instant; every track once."""
+    planned = Predicting().planning(range(1, 251), T0)
+    at, found = [], []
+    while planned.due < T0 + SECOND:
+        at.append(planned.due)
+        planned, tracks = planned.begun(planned.due)
+        found += tracks
+        assert len(tracks) <= TOGETHER
+    assert at == [T0, T0 + SECOND // 3, T0 + 2 * SECOND // 3]
+    assert found == list(range(1, 251))
