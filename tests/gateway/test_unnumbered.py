@@ -11,7 +11,7 @@ import pytest
 
 from gateway import pipeline
 from gateway.observation import Heard, Observation, RadarPlot
-from gateway.settings import RadarSite, with_radar
+from gateway.settings import SiteError, format_site, parse_site, with_radar
 from gateway.track import FIRST_OWN
 
 Differences = Callable[[dict[Any, dict[str, Any]], dict[Any, dict[str, Any]]], float]
@@ -218,12 +218,18 @@ def test_a_radar_that_is_back_after_a_silence_begins_anew_under_other_numbers(sc
     assert {row["radar_track"] for row in ran.rows()} == {f"1/{FIRST_OWN}", f"1/{FIRST_OWN + 1}"}
 
 
-def test_a_second_radar_of_the_site_is_a_radar_site() -> None:
-    """The settings of unnumbered plots have defaults: used numbers, everything else learnt."""
-    radar = RadarSite(1, 0.0, 0.0, 0.0, 0.0)
-    assert (radar.numbers, radar.period_s, radar.clutter_per_scan, radar.detection_probability) == (
-        "used",
-        None,
-        None,
-        None,
-    )
+def test_settings_of_unnumbered_plots_are_written_and_read(world: Any) -> None:
+    """What is set in the site file stands there when it is written again; what is not set, does not."""
+    radar = replace(world.site.radars[0], numbers="ignored", period_s=6.0, clutter_per_scan=40.0, slowest_mps=0.0)
+    radar = replace(radar, detection_probability=0.8)
+    read = parse_site(format_site(with_radar(world.site, radar))).radars[0]
+    assert (read.numbers, read.period_s, read.clutter_per_scan) == ("ignored", 6.0, 40.0)
+    assert (read.detection_probability, read.slowest_mps) == (0.8, 0.0)
+    assert "slowest_mps" not in format_site(world.site)
+
+
+def test_a_wrong_setting_is_told_with_its_line(world: Any) -> None:
+    """numbers knows two words."""
+    text = format_site(with_radar(world.site, replace(world.site.radars[0], numbers="ignored")))
+    with pytest.raises(SiteError, match="must be one of used, ignored"):
+        parse_site(text.replace('numbers = "ignored"', 'numbers = "maybe"'))
