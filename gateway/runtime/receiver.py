@@ -25,6 +25,7 @@ _WAIT_S = 0.02  # how long the thread waits for bytes before it looks at its lin
 _LAST_TURNS = 100  # what the kernel still holds at the end, but never a peer that sends without pause
 _REST_S = 0.004  # between turns that brought something
 _MUCH = 100  # chunks a turn from which on it may rest longer: few large turns cost less than many small ones
+_VERY_MUCH = 400  # from here on twice as long: what is taken sooner waits for its tick
 _OUTBOX_AT_MOST = 1000
 QUEUE_ARRIVALS = 200_000  # some 60 MB, and 20 s of the fastest stream measured
 
@@ -180,7 +181,9 @@ class Receiver:
     def _rest(self, heard: int) -> float:
         """How long to rest after a turn that brought so many chunks, s."""
         patience_s = min((link.patience_s for link in self._links), default=_REST_S)
-        return 0.0 if not heard else patience_s if heard >= _MUCH else min(_REST_S, patience_s)
+        if heard >= _MUCH:
+            return 2 * patience_s if heard >= _VERY_MUCH else patience_s
+        return min(_REST_S, patience_s) if heard else 0.0
 
     def _wait(self, wait_s: float) -> None:
         if self._rest_s and wait_s:
