@@ -21,6 +21,7 @@ LIVE_LIMIT_NS = 10 * 10**9
 _RESTART_NS = 10**9  # within the window, only a datagram this much newer than every other tells of a restart
 _SILENT_NS = 10 * 10**9  # a sender that was silent this long has been replaced, not doubled
 _FASTEST_HZ = 1000  # a jump ahead by more than the window that no radar could have sent is a restart, not a loss
+_LONGEST_GAP_S = 3600.0  # nor does a clock that leaps further make a loss of it: without a key anybody can write one
 _WRAP = 1 << 32
 _RADARS_AT_MOST = 64  # without a key; the numbers of more are made up
 _SENDERS_AT_MOST = 64  # of one radar; the one silent for longest is forgotten
@@ -45,7 +46,7 @@ class _Window:
         if time <= self.floor_time:
             return ("replayed" if keyed else None), "late", 0
         if 0 < ahead < _WRAP // 2:
-            elapsed_s = max(time - self.newest_time, 0) / 10**9
+            elapsed_s = min(max(time - self.newest_time, 0) / 10**9, _LONGEST_GAP_S)
             if ahead > WINDOW and ahead > _FASTEST_HZ * elapsed_s:
                 return self._restart(sequence, time) if time > self.newest_time or not keyed else ("replayed", "", 0)
             self.seen = (self.seen << ahead | 1) & ((1 << WINDOW) - 1) if ahead < WINDOW else 1

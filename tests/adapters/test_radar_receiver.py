@@ -76,6 +76,13 @@ def test_a_jump_that_no_radar_could_have_sent_is_a_restart_and_not_billions_lost
     assert receiver.counters["lost"] == 0
 
 
+def test_a_number_and_a_clock_that_leap_together_are_a_restart_too() -> None:
+    receiver = LandingRadarReceiver()
+    assert _hear(receiver, _datagram(1, at=START)) == "taken"
+    assert _hear(receiver, _datagram(2**31 - 1, at=START + 40 * 86_400 * SECOND)) == "taken"
+    assert (receiver.counters["restarted"], receiver.counters["lost"]) == (1, 0)
+
+
 def test_with_a_key_a_sequence_number_seen_before_is_refused_as_replayed() -> None:
     receiver = LandingRadarReceiver({1: KEY})
     recorded = [_datagram(number, key=KEY) for number in range(5)]
