@@ -37,9 +37,7 @@ class Arriving(Making):
         """The arrival's reports and plots in the site's frames; those whose time cannot be used are counted."""
         fixes, plots = [], []
         for observation in arrival.observations:
-            self.serial += isinstance(
-                observation, STAGED
-            )  # what passes by comes in pieces as ticks fall: no number hangs on it
+            self.serial += isinstance(observation, STAGED)  # how the rest comes together depends on the ticks
             if isinstance(observation, GpsReport):
                 fix, geoid = next(self._placed)
                 if geoid is not self.geoid and geoid.separation_m != self.geoid.separation_m:
