@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gateway.frames import RunwayFrame
 from gateway.observation import AirData, FlightPlan, GpsReport, Heard, Intent, Observation, PlanPoint
 from gateway.picture import Picture
 from gateway.pipeline import initial, step
@@ -181,3 +182,31 @@ def test_many_tracks_are_predicted_part_by_part_within_the_second() -> None:
         assert len(tracks) <= TOGETHER
     assert at == [T0, T0 + SECOND // 3, T0 + 2 * SECOND // 3]
     assert found == list(range(1, 251))
+
+
+def on_final(climb_mps: float) -> list[Picture]:
+    """Along the centreline at 70 m/s from 9 km before the aiming point, on the glide path or climbing from it."""
+    runway, frame, reports = DEMO_SITE.runway, RunwayFrame(DEMO_SITE.runway), []
+    for second in range(20):
+        along = runway.aiming_point_x_m - 9000.0 + 70.0 * second
+        up = 9000.0 * math.tan(runway.glide_path_rad) + climb_mps * second
+        latitude, longitude, height = map(float, frame.geodetic_from_runway([along, 0.0, up]))
+        at = T0 + second * SECOND
+        told = GpsReport(AIRCRAFT, at, at, latitude, longitude, None, height, 70.0, 0.0, climb_mps, 3.0, 3.0, 0.3)
+        reports.append(told)
+    return run(reports)
+
+
+def test_on_final_the_glide_path_leads_to_the_runway() -> None:
+    """Going down along it, the runway is what is inferred, and in 60 s it is lower by what the glide path asks for."""
+    pictures = on_final(-70.0 * math.tan(math.radians(3.0)))
+    assert rows(pictures)[-1][1:4] == ("two segments", "runway", "inferred")
+    last = [picture.predict for picture in pictures if len(picture.predict.made)][-1]
+    near, far = last.runway_m[-2:]
+    assert far[2] - near[2] == pytest.approx(-50.0 * 70.0 * math.tan(math.radians(3.0)), rel=0.05)
+    assert abs(far[1]) < 30.0
+
+
+def test_who_climbs_on_final_goes_around() -> None:
+    """Climbing along the centreline, a go-around is what is inferred."""
+    assert rows(on_final(3.0))[-1][2:4] == ("go-around", "inferred")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from gateway.estimators.two_segment import Ahead, Moving, Rule, ahead, angle_to_go
+from gateway.estimators.two_segment import Ahead, Circles, Moving, Rule, ahead, angle_to_go
 
 DEG = math.pi / 180.0
 RATE = 3.0 * DEG
@@ -113,3 +113,24 @@ def test_one_aircraft_has_the_same_bits_alone_and_among_many() -> None:
     for i in range(50):
         alone = some(slice(i, i + 1))
         assert (alone.position[0] == together.position[i]).all()
+
+
+def test_a_circle_is_entered_at_its_tangent_and_left_towards_the_next_point() -> None:
+    """Round a point to the left, at least once: on the circle in between, in the end on the way to the point after it."""
+    circles = Circles(np.array([[1000.0, math.nan]]), np.array([[2.0 * math.pi, 0.0]]))
+    now = Moving(np.zeros((1, 2)), EAST, np.zeros(1))
+    route = np.array([[[9000.0, 1000.0], [20000.0, 0.0]]])
+    found = ahead(now, route, np.array([110.0, 140.0, 200.0]), np.array([0.2]), circles=circles)
+    middle = np.array([9000.0, 1000.0])
+    assert np.linalg.norm(found.position[0, 0] - middle) == pytest.approx(1000.0, rel=0.02)
+    assert np.linalg.norm(found.position[0, 1] - middle) == pytest.approx(1000.0, rel=0.02)
+    assert found.position[0, 2, 0] > 11_000.0
+    assert found.turned[0, 2] == pytest.approx(2.0 * math.pi, abs=0.2)
+
+
+def test_who_has_landed_comes_to_rest() -> None:
+    """100 m/s, braked by 2 m/s2 from the last point on: 2500 m further, and no further."""
+    now = Moving(np.zeros((1, 2)), EAST, np.zeros(1))
+    found = ahead(now, np.array([[[1000.0, 0.0]]]), np.array([60.0, 120.0]), np.array([RATE]), braking=np.array([2.0]))
+    assert found.position[0, :, 0] == pytest.approx([3500.0, 3500.0])
+    assert found.over_s[0] == pytest.approx([50.0, 110.0])
