@@ -272,19 +272,8 @@ def _told(value: Any) -> Any:
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
-Observation = (
-    GpsReport
-    | RadarPlot
-    | RadarStatus
-    | Attitude
-    | ImuSample
-    | AirData
-    | VehicleStatus
-    | FlightPlan
-    | Intent
-    | Truth
-    | Many
-)
+_Said = VehicleStatus | FlightPlan | Intent | Truth
+Observation = GpsReport | RadarPlot | RadarStatus | Attitude | ImuSample | AirData | Many | _Said
 
 
 def how_many(observation: Observation) -> int:
