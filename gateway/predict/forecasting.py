@@ -35,7 +35,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-TOGETHER = 100  # tracks that are predicted at once; of more, each part has its own instant within the second
+TOGETHER = 150  # tracks that are predicted at once; of more, each part has its own instant within the second
 NEVER = 1 << 62
 NONE, INFERRED, DECLARED_KIND = 0, 1, 2
 TRUSTED = 0.5  # a declared goal with this trust is flown to
