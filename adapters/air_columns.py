@@ -1,25 +1,15 @@
-"""Air data of many frames side by side: the same as air.py reads from one."""
+"""Air data of many frames side by side: the same as air.py reads from one. Winds are not among them (`waiting` says why)."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.air import (
-    FASTEST_MPS,
-    GREATEST_HPA,
-    HIGHEST_M,
-    KELVIN_CENTIDEGREES,
-    LOWEST_M,
-    STRONGEST_MPS,
-    shown_wind,
-)
-from adapters.moments import LEAST_UNIX_USEC
-from adapters.rows import Floats, Integers, Rows, Truths
+from adapters.air import FASTEST_MPS, GREATEST_HPA, HIGHEST_M, KELVIN_CENTIDEGREES, LOWEST_M
+from adapters.rows import Rows
 from gateway.observation import AirData, Many
 
 _HUD = ("airspeed", "groundspeed", "climb", "alt")
@@ -54,40 +44,3 @@ def pressure(rows: Rows, fields: Sequence[tuple[int, NDArray[Any]]]) -> Many:
         differential_pressure_pa=pitot * 100,
         temperature_k=(centidegrees + KELVIN_CENTIDEGREES) / 100,
     )
-
-
-def wind(rows: Rows, fields: Sequence[tuple[int, NDArray[Any]]]) -> Many:
-    """WIND."""
-    ((_, told),) = fields
-    strength = rows.within(told["speed"].astype(np.float64), 0.0, STRONGEST_MPS)
-    bearing = rows.within(told["direction"].astype(np.float64), -360.0, 360.0)
-    down = rows.within(told["speed_z"].astype(np.float64), -STRONGEST_MPS, STRONGEST_MPS)
-    says = ~np.isnan(strength + bearing)
-    # One by one: NumPy's sines differ from the C library's in the last bit, and what is heard must not depend on with whom.
-    angles = list(map(math.radians, np.where(says, bearing, 0.0).tolist()))
-    east, north = -strength * np.array(list(map(math.sin, angles))), -strength * np.array(list(map(math.cos, angles)))
-    return _wind(rows, says, rows.at_receipt(), east, north, down)
-
-
-def wind_components(rows: Rows, fields: Sequence[tuple[int, NDArray[Any]]]) -> Many:
-    """WIND_COV."""
-    ((_, told),) = fields
-    known = ~(np.isnan(told["wind_x"]) | np.isnan(told["wind_y"]))
-    if not known.all():
-        rows, told = rows.saying(known), told[known]
-    north = rows.within(told["wind_x"].astype(np.float64), -STRONGEST_MPS, STRONGEST_MPS)
-    east = rows.within(told["wind_y"].astype(np.float64), -STRONGEST_MPS, STRONGEST_MPS)
-    down = told["wind_z"].astype(np.float64)
-    has_down = ~np.isnan(down)
-    down[has_down] = rows[has_down].within(down[has_down], -STRONGEST_MPS, STRONGEST_MPS)
-    usec = np.minimum(told["time_usec"], LEAST_UNIX_USEC).astype(np.int64)
-    return _wind(rows, ~np.isnan(north + east), rows.near(usec), east, north, down)
-
-
-def _wind(rows: Rows, says: Truths, valid_at: Integers, east: Floats, north: Floats, down: Floats) -> Many:
-    last = dict(zip(rows.vehicle[says].tolist(), np.flatnonzero(says).tolist(), strict=True))
-    for vehicle, row in last.items():
-        shown = shown_wind(float(east[row]), float(north[row]))
-        readings = rows.vehicles[vehicle].readings
-        rows.shown.extend((int(rows.places[row]), readings, name, value) for name, value in shown.items())
-    return rows.many(AirData, says, valid_at, wind_east_mps=east, wind_north_mps=north, wind_up_mps=-down)

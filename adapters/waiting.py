@@ -6,7 +6,6 @@ known what their senders' clocks had told when each came. A wind does not wait: 
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
 from operator import itemgetter
@@ -116,12 +115,12 @@ class Waiting:
         for number, last in dict(zip(numbers, self._arrivals.received_at[places].tolist(), strict=True)).items():
             self._vehicles[number].last_heard = max(self._vehicles[number].last_heard, last)
 
-    def read(self) -> tuple[list[Many], Counter[int], int]:
+    def read(self) -> tuple[list[Many], dict[int, int], int]:
         """What those say that came before the place `at`; how many observations by source, and the place of the last one."""
         places = self._places[self._places < self.at]
-        said, shown, found, silent = Counter[int](), list[Shown](), list[Many](), list[Integers]()
+        shown, found, silent = list[Shown](), list[Many](), list[Integers]()
         if not len(places):
-            return found, said, -1
+            return found, {}, -1
         self._mark_heard(places)
         kinds = _ORDER[self._heads[places] >> 24]
         order = np.argsort(kinds, kind="stable")
@@ -134,10 +133,10 @@ class Waiting:
             one = reader(rows[parts[0][1] : parts[-1][2]], told)
             if len(one):
                 found.append(one)
-        for number, count in enumerate(np.bincount(rows.source).tolist()):
-            said[number] += count
-        for number, count in enumerate(np.bincount(np.concatenate(silent)).tolist() if silent else ()):
-            said[number] -= count
+        counts = np.bincount(rows.source)
+        for sources in silent:
+            counts -= np.bincount(sources, minlength=len(counts))
+        said = {number: int(counts[number]) for number in np.flatnonzero(counts).tolist()}
         shown.sort(key=itemgetter(0))
         for _, where, name, value in shown:
             where[name] = value

@@ -117,6 +117,30 @@ def test_what_no_stage_reads_is_one_thing_heard_a_second_and_apart_from_what_one
     assert max(map(len, many)) > 10
 
 
+def test_observations_are_counted_for_the_sources_that_made_them_whatever_their_numbers() -> None:
+    """Sources 3 and 7, of which 7 sends only what is no number: they are no observations, as one by one."""
+    links = [Source(3, "mavlink", "north", "udpin:0"), Source(7, "mavlink", "south", "udpin:1")]
+    alone, together = Decoder(links), Decoder(links)
+    arrivals = []
+    for place in range(600):
+        number, sequence, now = (3, 7)[place % 2], place // 2 & 255, T0 + place * 4_000_000
+        name = ("HEARTBEAT", "SYSTEM_TIME")[place // 2] if place < 4 else "VFR_HUD"
+        values = {field: some[0] for field, some in VALUES[name].items()}
+        if name == "SYSTEM_TIME":
+            values |= {"time_boot_ms": 20_000 + place * 4, "time_unix_usec": now // 1000}
+        if name == "VFR_HUD" and number == 7:
+            values |= dict.fromkeys(("airspeed", "groundspeed", "alt", "climb"), NO)
+        frame = encode(name, values, system=number, component=1, sequence=sequence)
+        arrivals.append(Arrival(now, number, frame))
+    for one in arrivals:
+        alone.hear(one)
+    for first in range(0, len(arrivals), 100):
+        together.hear_many(arrivals[first : first + 100])
+    rates = {source.name: source.rate_hz for source in together.health(arrivals[-1].received_at).sources}
+    assert rates["north"] > 1 > rates["south"]
+    assert _all_of(together, arrivals[-1].received_at) == _all_of(alone, arrivals[-1].received_at)
+
+
 def _all_of(decoder: Decoder, now: int) -> str:
     """Everything that is known of the components, in words."""
     components = decoder._mavlink.registry.components
