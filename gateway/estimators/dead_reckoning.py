@@ -125,12 +125,6 @@ def with_place(
     return _with(state, between(latitude, longitude, height, state.motion), _EYE[PLACE], sigma_m)
 
 
-def with_height(state: Reckoning, height_m: ArrayLike, sigma_m: ArrayLike) -> tuple[Reckoning, Innovation]:
-    """With a height, such as pressure tells it."""
-    off = state.motion.height_m - np.asarray(height_m, dtype=np.float64)
-    return _with(state, off[..., None], _EYE[2:3], np.asarray(sigma_m)[..., None])
-
-
 def with_velocity(state: Reckoning, velocity_mps: ArrayLike, sigma_mps: ArrayLike) -> tuple[Reckoning, Innovation]:
     """With a velocity over the ground (..., 3) north, east, down; nought for what stands still."""
     return _with(state, np.asarray(velocity_mps) - state.motion.velocity_mps, _EYE[VELOCITY], sigma_mps)

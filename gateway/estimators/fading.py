@@ -1,4 +1,4 @@
-"""A look ahead for filters of position, velocity and acceleration, axis by axis: the acceleration dies away.
+"""Silence for filters of position, velocity and acceleration, axis by axis: the acceleration dies away.
 
 Nobody turns for ever: held over half a minute, an acceleration leads far off. Here it fades with a time constant, shaken
 by white noise of the same density that the filter has learnt (Singer's model), so that for times well below the time

@@ -171,11 +171,3 @@ def from_angles(roll_rad: ArrayLike, pitch_rad: ArrayLike, yaw_rad: ArrayLike) -
         cr * cp * sy - sr * sp * cy,
     )
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
-
-
-def angles(attitude: Floats) -> tuple[Floats, Floats, Floats]:
-    """Roll, pitch, yaw, rad, of quaternions."""
-    turned = matrix(attitude)
-    roll = np.arctan2(turned[..., 2, 1], turned[..., 2, 2])
-    pitch = -np.arcsin(np.clip(turned[..., 2, 0], -1.0, 1.0))
-    return roll, pitch, np.arctan2(turned[..., 1, 0], turned[..., 0, 0])

@@ -45,7 +45,6 @@ __all__ = [
     "Rule",
     "begin",
     "combine",
-    "held",
     "predict",
     "stacked",
     "stated",
@@ -228,16 +227,6 @@ def _course(level: Floats) -> Floats:
     """Level velocities (n, 2) as directions of length 1; 0 of what stands."""
     speed = np.sqrt(level[:, 0] * level[:, 0] + level[:, 1] * level[:, 1])[:, None]
     return np.where(speed > 0.0, level / np.maximum(speed, 1e-300), 0.0)
-
-
-def held(mixture: Mixture, elapsed_s: Floats, modes: Modes) -> Estimate:
-    """The states `elapsed_s` (n,) later if each track goes on in the mode that is likeliest now.
-
-    A look far ahead is not an average of turning round to the left and to the right.
-    """
-    ahead = predict(mixture, elapsed_s, modes, np.eye(modes.count)[None])
-    rows, likeliest = np.arange(len(elapsed_s)), mixture.weight.argmax(axis=1)
-    return Estimate(ahead.mean[rows, likeliest, :SIZE], ahead.covariance[rows, likeliest, :SIZE, :SIZE])
 
 
 def update(

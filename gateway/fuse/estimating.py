@@ -66,11 +66,8 @@ class Estimator(Protocol):
     def advance(self, before: Sequence[Event], group: Group) -> Advanced:
         """Some tracks carried on from their events to a measurement each, and corrected."""
 
-    def ahead(self, events: Sequence[Event], elapsed_s: Floats, *, far: bool) -> tuple[Estimate, Floats]:
-        """States a while (n,) after events, and the probabilities (n, 3) of straight, left and right, NaN = no modes.
-
-        `far`: a look ahead for people, and not the filter's own step to what comes next.
-        """
+    def ahead(self, events: Sequence[Event], elapsed_s: Floats) -> tuple[Estimate, Floats]:
+        """States a while (n,) after events, and the probabilities (n, 3) of straight, left and right, NaN = no modes."""
 
     def directions(self, event: Event) -> Floats:
         """Probabilities (3,) of flying straight, left and right; NaN = no modes."""
@@ -97,7 +94,7 @@ class SingleModel:
             residual = _residual(told.innovation, told.covariance, told.measured)
         return Advanced(after, (None,) * len(before), memory, told.outlying, far, residual)
 
-    def ahead(self, events: Sequence[Event], elapsed_s: Floats, *, far: bool) -> tuple[Estimate, Floats]:
+    def ahead(self, events: Sequence[Event], elapsed_s: Floats) -> tuple[Estimate, Floats]:
         """See `Estimator`."""
         mean = np.array([event.mean for event in events]).reshape(-1, SIZE)
         covariance = np.array([event.covariance for event in events]).reshape(-1, SIZE, SIZE)
@@ -141,14 +138,11 @@ class InteractingModels:
             residual = _residual(told.innovation, told.scatter, each.measured[::m])
         return Advanced(modes.stated(mixtures), beliefs, known, told.outlying, far, residual)
 
-    def ahead(self, events: Sequence[Event], elapsed_s: Floats, *, far: bool) -> tuple[Estimate, Floats]:
-        """See `Estimator`. Far ahead the likeliest mode is kept."""
+    def ahead(self, events: Sequence[Event], elapsed_s: Floats) -> tuple[Estimate, Floats]:
+        """See `Estimator`."""
         if not events:
             return Estimate(np.zeros((0, SIZE)), np.zeros((0, SIZE, SIZE))), np.zeros((0, 3))
-        mixtures = _mixtures(events)
-        if far:
-            return modes.held(mixtures, elapsed_s, self.modes), self.modes.directions(mixtures.weight)
-        mixtures = modes.predict(mixtures, elapsed_s, self.modes)
+        mixtures = modes.predict(_mixtures(events), elapsed_s, self.modes)
         return modes.combine(mixtures), self.modes.directions(mixtures.weight)
 
     def directions(self, event: Event) -> Floats:

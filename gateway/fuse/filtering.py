@@ -54,14 +54,9 @@ def estimator_of(model: Model) -> Estimator:
     return SingleModel(model) if model.modes is None else InteractingModels(model, model.modes)
 
 
-def carried_on(
-    events: Sequence[Event], elapsed_s: Floats, model: Model, *, far: bool = False
-) -> tuple[Estimate, Floats]:
-    """States of some tracks a while (n,) after their events, and the modes' probabilities (n, 3), NaN if there are none.
-
-    `far`: a look ahead, in which the likeliest mode is kept, and not the filter's own step to what comes next.
-    """
-    return estimator_of(model).ahead(events, elapsed_s, far=far)
+def carried_on(events: Sequence[Event], elapsed_s: Floats, model: Model) -> tuple[Estimate, Floats]:
+    """States of some tracks a while (n,) after their events, and the modes' probabilities (n, 3), NaN if there are none."""
+    return estimator_of(model).ahead(events, elapsed_s)
 
 
 def directions(event: Event, model: Model) -> Floats:

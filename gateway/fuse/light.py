@@ -27,7 +27,7 @@ from gateway.fuse.weighting import Model, weigh_literally
 Floats = NDArray[np.float64]
 
 LONGEST_STEP_S = 10.0  # that an acceleration is held over, two reports of a slow source
-FADES_IN_S = 2.0  # accelerations, in a look ahead
+FADES_IN_S = 2.0  # accelerations, while nothing is measured
 _S, _V, _E = np.arange(3), np.arange(3, 6), np.arange(6, 9)
 
 
@@ -66,7 +66,7 @@ class LightFilter:
         far = told.normalised > FAR_SIGMA**2 * np.maximum(told.measured.sum(axis=1), 1)
         return Advanced(_current(after), list(_packed(after)), memory, told.outlying, far)
 
-    def ahead(self, events: Sequence[Event], elapsed_s: Floats, *, far: bool) -> tuple[Estimate, Floats]:
+    def ahead(self, events: Sequence[Event], elapsed_s: Floats) -> tuple[Estimate, Floats]:
         """See `Estimator`."""
         if not events:
             return Estimate(np.zeros((0, SIZE)), np.zeros((0, SIZE, SIZE))), np.zeros((0, 3))

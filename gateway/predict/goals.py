@@ -18,14 +18,13 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 COUNT = (
-    20  # places for candidates; always as many, so that sums over them have the same bits for one aircraft and for many
+    18  # places for candidates: always as many, so that sums over them have the same bits for one aircraft and for many
 )
 LEGS = 4  # points of a route: the candidate and what the plan has after it
 PLANNED = range(0, 10)
 DECLARED, HOME = 10, 11
 PUBLISHED = range(12, 16)
 RUNWAY, GO_AROUND = 16, 17
-AROUND = range(18, 20)  # beside weather that lies across the way
 FULL_TURN = 2.0 * math.pi
 SAME_PLACE_RAD = 1e-6
 GO_AROUND_M = 5000.0  # beyond the runway's far end
@@ -33,17 +32,17 @@ GO_AROUND_M = 5000.0  # beyond the runway's far end
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Goals:
-    """Candidates of one aircraft: route (20, 4, 2) east and north, up (20, 4), NaN = none; the first of each is the candidate."""
+    """The c = COUNT candidates of one aircraft: route (c, 4, 2) east and north, up (c, 4), NaN = none; the first of each is the candidate."""
 
     route: Floats
     up: Floats
     names: tuple[str | None, ...]
-    planned: Bools  # (20,)
-    lands: Bools  # (20, 4)
-    circles: Bools  # (20,) a point to be flown round, not over
-    rounds: Bools  # (20,) such a point, of which the radius is not known, is the last of the route
-    radius: Floats  # (20, 4) of what is flown round, positive to the left; NaN = none, or not known
-    least: Floats  # (20, 4) radians that are flown round it at least
+    planned: Bools  # (c,)
+    lands: Bools  # (c, 4)
+    circles: Bools  # (c,) a point to be flown round, not over
+    rounds: Bools  # (c,) such a point, of which the radius is not known, is the last of the route
+    radius: Floats  # (c, 4) of what is flown round, positive to the left; NaN = none, or not known
+    least: Floats  # (c, 4) radians that are flown round it at least
     declared: int = -1  # which one it is said to go to
     declared_at: int = 0
 

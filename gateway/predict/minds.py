@@ -30,11 +30,11 @@ class Minds:
     speed: Floats  # (n,)
     wander: Floats  # (n,) mean square of what the speed changes by in a second, faded; NaN = not known yet
     unsettled: Floats  # (n,) radians that it turned by lately, faded
-    agreed: Floats  # (n, 20), `intent.Seen`
+    agreed: Floats  # (n, c), `intent.Seen`
     length: Floats  # (n,)
-    last: Floats  # (n, 20)
+    last: Floats  # (n, c)
     turning: Ints  # (n,)
-    flown_at: Floats  # (n, 20)
+    flown_at: Floats  # (n, c)
     trust: Floats  # (n,) that it goes where it declared
     declared_at: Ints  # (n,) since when it is said to go there
     circled: Floats  # (n,) radians flown round it, if it is a point that is flown round

@@ -20,7 +20,6 @@ SECOND = 1_000_000_000
 INFERENCE = Inference()
 LEAST_SPEED_MPS = 3.0  # slower, a course says nothing
 STALE_S = 10.0  # after a gap as long as this the course begins anew
-RATE_MEMORY_S = 1.5  # of the turn rate that is measured from the course
 LEAST_RATE_RPS = math.radians(0.75)  # a slower turn is none
 SURE_SIGMAS = 3.0
 STILL_THERE_RAD = math.radians(12.0)  # sigma of the course now about the direction to an inferred point
@@ -54,15 +53,6 @@ class Motions:
     acceleration: Floats  # of the ground speed, as far as it is sure, m/s2
     speed_sigma: Floats  # of the velocity, m/s: the filter's, or less where the speed hardly moves about
     unsettled: Floats  # radians that it turned by lately
-
-
-@dataclass(frozen=True, slots=True)
-class Thought:
-    """What is believed of n aircraft: by inference, and of the declared goal."""
-
-    belief: Belief
-    off: Floats  # (n, 20) angles to the candidates
-    follows: Floats  # (n,) trust in the declared goal, NaN = none declared
 
 
 def motions(
@@ -129,7 +119,7 @@ def _wander(before: Minds, speed: Floats, fresh: Bools, period_s: Floats) -> Flo
 def inferred(
     before: Minds, at: int, now: Motions, places: Floats, planned: Bools, lowered: Floats
 ) -> tuple[intent.Seen, Belief, Floats]:
-    """To which of its candidates (n, 20, 2) each aircraft goes; `lowered` (n, 20) are factors on their weights."""
+    """To which of its candidates (n, c, 2) each aircraft goes; `lowered` (n, c) are factors on their weights."""
     elapsed_s = np.where(before.at == UNKNOWN, 1.0, np.maximum((at - before.at) / SECOND, 0.0))
     off = intent.off_course(now.position, now.velocity, places)
     seen, by_course = intent.seen(before.seen, off, now.side, elapsed_s, INFERENCE)

@@ -9,7 +9,7 @@ from gateway.observation import AirData, FlightPlan, Intent
 
 SECOND = 1_000_000_000
 AIRCRAFT_AT_MOST = 10_000  # a bound on what strangers can make us remember
-TELLERS = ("operator", "utm", "mission", "high latency")  # whoever stands first is believed first
+TELLERS = ("utm", "mission", "high latency")  # whoever stands first is believed first
 FORGOTTEN_AFTER = 3600 * SECOND  # of aircraft that are not tracked
 
 Said = FlightPlan | Intent | AirData

@@ -295,14 +295,14 @@ def test_what_is_not_seen_is_known_less_and_less(world: Any) -> None:
 
 
 def test_an_acceleration_is_not_held_for_ever(world: Any) -> None:
-    """A look ahead in a turn of 5 m/s2 ends within 700 m of straight on after a minute; held, that would be 9 km."""
+    """Who falls silent in a turn of 5 m/s2 is carried on to within 700 m of straight on after a minute; held, that would be 9 km."""
     course = world.Course(swing_m=0.0)
     aside = [2.5 * max(0.2 * k - 10.0, 0.0) ** 2 for k in range(80)]
     sure = np.full(3, 1.0)
     fixes = [world.fix(course, 0.2 * k, serial=k, off_m=(0.0, y, 0.0), sigma_m=sure) for k, y in enumerate(aside)]
     model = _model(world)
     last = _events(world, fixes)[-1]
-    ahead, _ = carried_on([last], np.array([60.0]), model, far=True)
+    ahead, _ = carried_on([last], np.array([60.0]), model)
     straight = last.mean[POSITION] + 60.0 * last.mean[VELOCITY]
     assert np.linalg.norm(last.mean[VELOCITY] - _speed(world, course)) > 25.0
     assert 300.0 < np.linalg.norm(ahead.mean[0, POSITION] - straight) < 700.0

@@ -130,12 +130,12 @@ def test_what_was_said_earlier_but_heard_later_changes_nothing() -> None:
     assert tellings.by_aircraft[AIRCRAFT].declared == newer
 
 
-def test_an_operator_is_believed_before_the_vehicle_until_withdrawn() -> None:
-    """A point that a person declares overrides the mission's; one without a goal takes it back."""
-    ordered = Intent(AIRCRAFT, T0, T0, "operator", latitude_rad=0.5, longitude_rad=1.8)
+def test_utm_is_believed_before_the_mission_until_withdrawn() -> None:
+    """A point that UTM declares overrides the mission's; one without a goal takes it back."""
+    ordered = Intent(AIRCRAFT, T0, T0, "utm", latitude_rad=0.5, longitude_rad=1.8)
     tellings = Tellings().hearing(goes_to(3, 5.0)).hearing(ordered)
     assert tellings.by_aircraft[AIRCRAFT].declared == ordered
-    withdrawn = tellings.hearing(Intent(AIRCRAFT, T0 + SECOND, T0 + SECOND, "operator"))
+    withdrawn = tellings.hearing(Intent(AIRCRAFT, T0 + SECOND, T0 + SECOND, "utm"))
     assert withdrawn.by_aircraft[AIRCRAFT].declared == goes_to(3, 5.0)
 
 
