@@ -14,8 +14,8 @@ from adapters.pcap import PcapWriter
 from adapters.tlog import TlogWriter, tlog_records
 from gateway.runtime.commands import CommandsWriter
 from gateway.runtime.folder import INPUTS, InputFile, Record, write_record
-from gateway.runtime.hold import Hold
 from gateway.runtime.wholefile import WholeFile
+from gateway.sinks.hold import Hold
 
 _SUFFIXES: dict[Kind, str] = {"mavlink": "tlog", "radar": "pcap", "told": "jsonl"}
 _WRITERS: dict[Kind, type[TlogWriter] | type[PcapWriter] | type[CommandsWriter]] = {

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gateway.runtime.folder import SESSION_FILE, FolderError, Record, read_record, write_record
-from gateway.runtime.hold import is_held
 from gateway.runtime.inputs import SessionInput
 from gateway.runtime.outputs import RRD_FILE
+from gateway.sinks.hold import is_held
 from gateway.sinks.parquet import finish, unfinished
 
+_DRAWN_WITHIN_S = 10.0  # of the kill: what was handed over to the process that draws is less than a second
 _UNTOLD_NS = 2_000_000_000  # rows are not further ahead of session.json; a stream at another speed has another clock
 
 
@@ -62,7 +64,7 @@ def mend(folder: Path) -> str:
     record = read_record(folder)
     if record.ended is not None and not unfinished(folder):
         return ""
-    if is_held(folder, folder / SESSION_FILE):
+    if is_held(folder, folder / SESSION_FILE) or not _is_drawn(folder / RRD_FILE):
         return ""
     made = finish(folder)
     _repair_rrd(folder / RRD_FILE)
@@ -70,6 +72,16 @@ def mend(folder: Path) -> str:
         write_record(folder, replace(record, ended="killed", watermark=_watermark(folder, record)))
     tables = ", ".join(path.name for path in made) or "no tables"
     return f"was not ended properly; completed ({tables})"
+
+
+def _is_drawn(path: Path) -> bool:
+    """Whether nobody writes the recording: after a kill the process that draws is waited for, which soon ends by itself."""
+    patience = time.monotonic() + _DRAWN_WITHIN_S
+    while path.exists() and is_held(path, path):
+        if time.monotonic() > patience:
+            return False
+        time.sleep(0.05)
+    return True
 
 
 def _watermark(folder: Path, record: Record) -> int:

@@ -14,6 +14,7 @@ from gateway.picture import Picture
 from gateway.settings import Site
 from gateway.sinks.blueprint import blueprint
 from gateway.sinks.feed import FileFeed, Identity, ServedFeed
+from gateway.sinks.hold import Hold
 from gateway.sinks.recording import optimise
 from gateway.sinks.scene.clutter import ClutterScene
 from gateway.sinks.scene.entry import Entry, made
@@ -67,6 +68,7 @@ class RerunSink:
         self._served = ServedFeed(*serve, identity, views, memory_limit) if serve else None
         try:
             self._file = FileFeed(path, identity, views) if path else None
+            self._hold = Hold(path) if path else None
         except OSError:
             if self._served:
                 self._served.close()
@@ -139,6 +141,8 @@ class RerunSink:
                 if self._file and self._file.close() and made_small:
                     optimise(self._file.path)
             finally:
+                if self._hold:
+                    self._hold.release()
                 if self._served:
                     self._served.close()
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from gateway.runtime import sessions
 from gateway.runtime.folder import (
     FolderError,
     InputFile,
@@ -15,8 +16,8 @@ from gateway.runtime.folder import (
     session_name,
     write_record,
 )
-from gateway.runtime.hold import Hold, is_held
 from gateway.settings import Options
+from gateway.sinks.hold import Hold, is_held
 
 RECORD = Record(
     version="0.1.0",
@@ -87,3 +88,26 @@ def test_a_folder_is_held_until_it_is_let_go(tmp_path: Path) -> None:
     assert is_held(tmp_path, tmp_path / "session.json")
     hold.release()
     assert not is_held(tmp_path, tmp_path / "session.json")
+
+
+@pytest.mark.parametrize("ends", [True, False])
+def test_a_killed_session_is_mended_when_the_process_that_draws_has_let_go_of_the_recording(
+    tmp_path: Path, ends: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is waited for; where it goes on and on, the session is one that is still written."""
+    record = replace(RECORD, ended=None, sources=())
+    write_record(tmp_path, record)
+    (tmp_path / "session.rrd").write_bytes(b"")
+    hold, waited = Hold(tmp_path / "session.rrd"), list[float]()
+
+    def wait(length_s: float) -> None:
+        waited.append(length_s)
+        if ends:
+            hold.release()
+
+    monkeypatch.setattr(sessions.time, "sleep", wait)
+    monkeypatch.setattr(sessions.time, "monotonic", lambda: sum(waited))
+    assert bool(sessions.mend(tmp_path)) == ends
+    assert read_record(tmp_path).ended == ("killed" if ends else None)
+    assert len(waited) == 1 or sum(waited) > 9.0
+    hold.release()

@@ -14,6 +14,7 @@ import pytest
 from gateway.picture import Picture
 from gateway.settings import DEMO_SITE
 from gateway.sinks.apart import Apart
+from gateway.sinks.hold import is_held
 from gateway.sinks.rerun import RerunSink
 
 
@@ -56,12 +57,15 @@ def test_the_same_is_drawn_as_here_whatever_the_terminal_tells_everybody(tmp_pat
     port = int(apart.address.removesuffix("/proxy").rsplit(":", 1)[1])
     with socket.create_connection(("127.0.0.1", port), timeout=5.0):
         pass
+    path = tmp_path / "apart.rrd"
+    assert is_held(path, path)  # by the process that draws
     for number in (signal.SIGINT, signal.SIGTERM):
         os.kill(apart.process, number)
     write_all(apart, made[50:])
     apart.close()
     apart.close()  # which does nothing
     assert apart._child.returncode == 0
+    assert not is_held(path, path)
     drawn = {name: without_row_ids(read(tmp_path / f"{name}.rrd")) for name in ("here", "apart")}
     assert drawn["apart"].keys() == drawn["here"].keys()
     assert repr(drawn["apart"]) == repr(drawn["here"])  # as text, where what is not known equals itself

@@ -1,7 +1,8 @@
-"""A session's folder is held by the process that writes it, so that nobody mends what is still growing.
+"""What a process writes is held by it, so that nobody mends what is still growing: a session's folder, and its recording.
 
-The hold is a lock on the folder itself, which the system lets go when the process dies, however it dies. Where folders
-cannot be locked (Windows), a session.json that is younger than a few seconds tells that somebody still writes it.
+The hold is a lock on the folder or the file itself, which the system lets go when the process dies, however it dies. Where
+there are no such locks (Windows), a file that is younger than a few seconds tells that somebody still writes it. The process
+that draws holds the recording for itself: when the gateway is killed, it still draws what was handed over.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ _STILL_WRITTEN_S = 10.0
 
 
 class Hold:
-    """Holds a folder from now until `release`."""
+    """Holds a folder or a file from now until `release`."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, path: Path) -> None:
         self._descriptor: int | None = None
         if fcntl is not None:
-            self._descriptor = os.open(folder, os.O_RDONLY)
+            self._descriptor = os.open(path, os.O_RDONLY)
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
     def release(self) -> None:
@@ -34,11 +35,11 @@ class Hold:
             self._descriptor = None
 
 
-def is_held(folder: Path, written: Path) -> bool:
-    """Whether a process is still writing this folder, of which `written` is rewritten all the time."""
+def is_held(path: Path, written: Path) -> bool:
+    """Whether a process is still writing this folder or file, of which `written` is rewritten all the time."""
     if fcntl is None:
         return time.time() - written.stat().st_mtime < _STILL_WRITTEN_S
-    descriptor = os.open(folder, os.O_RDONLY)
+    descriptor = os.open(path, os.O_RDONLY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
