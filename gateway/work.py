@@ -4,25 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Literal
 
 from gateway import associate, fuse, predict, track
 from gateway.align import SECOND, Fix
-from gateway.associate import Association, Spans
-from gateway.fuse import Lane, LifeChange
+from gateway.associate import Association
+from gateway.fuse import Lane
 from gateway.fuse.consistency import Finding
+from gateway.fusing import Fusing
 from gateway.making import NAMED_AT_MOST
 from gateway.observation import Heard
 from gateway.picture import Event
 from gateway.register import WAIT_NS, gathered, remaining, residuals
-from gateway.track import Key, RadarTracks
-from gateway.tracking import Tracked, Tracking
+from gateway.track import RadarTracks
+from gateway.tracking import Tracked
 
 QUARTER = SECOND // 4
 PLOT_MARGIN_S = 4.0  # plots are remembered this much longer than reports: a report's check looks back over them
 
 
-class Work(Tracking):
+class Work(Fusing):
     """The stages of one step; lives only inside `pipeline.step`, which calls them in order for each arrival."""
 
     # what happens by itself ---------------------------------------------------------------------------------------
@@ -191,15 +191,6 @@ class Work(Tracking):
             verb = "is" if change.kind == "associated" else "is no longer"
             self.events.append(Event(change.at, "info", f"{change.aircraft} {verb} radar track {change.radar_track}"))
 
-    def _reroute(self, known: Spans, at: int) -> None:
-        """After pairs changed from what was known: plots move between system tracks, and radars' tracks join others."""
-        self.lanes, jobs = fuse.reroute(self.lanes, known, self._scene())
-        # Before the rows are written, which may be under the number of a track that joined.
-        self.lanes, ended = fuse.joined(self.lanes, self._spans, self.tracks, at)
-        self.ended += ended
-        self.jobs = {job.track: job for job in jobs}
-        self._settle()
-
     def _join_radars(self, at: int) -> None:
         """Radar tracks of several radars that are one target, brought into one system track; and others out of it."""
         if len(self.radars) < 2:
@@ -262,49 +253,3 @@ class Work(Tracking):
             self.geoid.separation_m,
         )
         self.forecasts.append(made)
-
-    # fuse ---------------------------------------------------------------------------------------------------------
-
-    def fuse(self, fixes: Sequence[Fix], tracked: Tracked) -> None:
-        """Every report and plot into the system track that it belongs to."""
-        scene = self._scene()
-        for fix in fixes:
-            self._settle(self.lanes.by_aircraft.get(fix.aircraft))
-            self._work_in(*fuse.take_fix(self.lanes, fix, scene))
-        for plot, key in tracked:
-            lane = fuse.lane_of(self.lanes, plot, key, scene)
-            if lane is None and (goes_on := self._goes_on(key, plot.at)):
-                if goes_on == "not yet":
-                    continue
-                scene = self._scene()
-                lane = fuse.lane_of(self.lanes, plot, key, scene)
-            self._settle(lane)
-            if not fuse.contains(self.lanes, lane, plot):  # a pair that changed just now may have taken it along
-                self._work_in(*fuse.take_plot(self.lanes, plot, key, scene))
-
-    def _goes_on(self, key: Key, at: int) -> bool | Literal["not yet"]:
-        """Whether a new radar track goes on where another one fell silent; if so it is that one's track from now on."""
-        self._settle()
-        known, scene = self._spans, self._scene()
-        if (lanes := fuse.adopted_earlier(self.lanes, key, at)) is not None:
-            self.lanes = lanes
-            self.lanes, jobs = fuse.reroute(lanes, known, self._scene())
-            self.jobs = {job.track: job for job in jobs}
-            self._settle()
-            return True
-        found = fuse.continued(self.lanes, key, scene, self.model)
-        if found is None:
-            return False
-        if isinstance(found, str):
-            return found
-        self.lanes, job = fuse.taken_on(self.lanes, found, scene)
-        jobs = [job] if job is not None else []
-        if job is None:
-            self.lanes, jobs = fuse.reroute(self.lanes, known, self._scene())
-        self.jobs = {job.track: job for job in jobs}
-        self._settle()
-        if found.former is not None:
-            self.tracks = self.tracks.closing(found.former, found.since)
-        self.lived.append(LifeChange(found.since, found.lane.number, "confirmed", found.reason()))
-        self.events.append(Event(found.since, "info", f"track {found.lane.number} goes on as {found.reason()}"))
-        return True

@@ -11,46 +11,21 @@ the radar's numbered plots.
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gateway.align import SECOND, Plot
-from gateway.estimators.track_splitting import Bank, Plots, Splitting, scan
+from gateway.estimators.track_splitting import Bank
 from gateway.settings import Options, RadarSite
 from gateway.track.density import Density
 from gateway.track.numbered import FIRST_OWN
-from gateway.track.sight import RadarSight
-
-Floats = NDArray[np.float64]
+from gateway.track.slices import Slice, forgotten_s, order_of, worked_slice
 
 SLICES = 4  # of a period
 WAIT_NS = SECOND // 10  # for the other plots of a scan
-GREATEST_LEVEL_MPS, GREATEST_CLIMB_MPS = 300.0, 40.0
-FORGOTTEN_S, FORGOTTEN_SCANS = 10.0, 5.0  # of silence of a whole radar, whichever is longer
-BUDGET = 2000  # hypotheses of a radar
 PLOTS_AT_MOST = 10_000  # of a slice
 WAITING_AT_MOST = 20_000
-SURE = 0.5  # a plot is told of a family that has it with more than this weight
-SURE_SIGMAS = 4.5  # of a speed: three in a million, because dozens of birds are asked after every scan
-CONFIRM_AT = 0.9999
-LEAST_WEIGHT = 0.05  # of a hypothesis: few targets, so there is time for more of them
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Slice:
-    """One slice of a radar's time: its plots in order, and all that was known after it."""
-
-    index: int
-    plots: tuple[Plot, ...]
-    bank: Bank
-    density: Density
-    told: Mapping[int, int]  # serial of a plot -> the family that it was told of in this slice
-    crowded: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,7 +130,7 @@ class Unnumbered:
             old = bisect_left(watch.slices, before // width, key=lambda one: one.index)
             if old == len(watch.slices) and not watch.waiting:
                 silent_s = (before - watch.newest[0].at) / SECOND
-                if silent_s > max(FORGOTTEN_S, FORGOTTEN_SCANS * watch.period_s):
+                if silent_s > forgotten_s(watch.period_s):
                     next_numbers[radar] = watch.next_number
                     continue
             if old:
@@ -191,94 +166,13 @@ def _worked(watch: Watch, site: RadarSite, options: Options) -> tuple[Watch, Tak
     told = {serial: family for one in slices for serial, family in one.told.items()}
     known = len(slices)
     for index in sorted(by_slice):
-        plots = tuple(sorted(by_slice[index], key=_order)[:PLOTS_AT_MOST])
-        one = _slice(index, plots, bank, density, told, watch, site, options)
+        plots = tuple(sorted(by_slice[index], key=order_of)[:PLOTS_AT_MOST])
+        one = worked_slice(index, plots, bank, density, told, watch.period_s, site, options)
         bank, density = one.bank, one.density
         told |= one.told
         slices.append(one)
     grown = replace(watch, slices=tuple(slices), waiting=(), due=None)
     return _difference(grown, again, slices[known:], watch.waiting)
-
-
-def _order(plot: Plot) -> tuple[float, ...]:
-    """By what was measured, so that it does not matter in which order plots came; nothing sorts after NaN, so that is -1."""
-    return (plot.at, *(-1.0 if math.isnan(part) else part for part in plot.polar), plot.serial)
-
-
-def _slice(
-    index: int,
-    plots: Sequence[Plot],
-    bank: Bank,
-    density: Density,
-    told: Mapping[int, int],
-    watch: Watch,
-    site: RadarSite,
-    options: Options,
-) -> Slice:
-    """One slice worked after another."""
-    at = plots[-1].at
-    share = min((at - bank.at) / SECOND / watch.period_s, 1.0) if density.scans else 1.0
-    if (at - bank.at) / SECOND > max(FORGOTTEN_S, FORGOTTEN_SCANS * watch.period_s):
-        bank = Bank.empty(at, 3)  # nothing holds over such a time
-    value = np.array([plot.polar for plot in plots]).T
-    variance = np.array([plot.sigma for plot in plots]).T ** 2
-    if not density.scans:  # nothing is known yet: this piece itself tells how dense it is here
-        density = density.after(value, np.ones(len(plots)), share)
-    clutter, newborn = density.of(value)
-    serial = np.array([plot.serial for plot in plots], dtype=np.int64)
-    seen = Plots(value, variance, clutter, newborn, np.array([plot.at for plot in plots], dtype=np.int64), serial)
-    looked = dict(zip(bank.number.tolist(), bank.looks.tolist(), strict=True))
-    was = set(bank.number[bank.confirmed].tolist())
-    bank, found = scan(bank, seen, at, RadarSight(), _splitting(density, options), watch.period_s)
-    bank = _flying(bank, was, site.slowest_mps)
-    best = bank.best
-    now = np.flatnonzero(bank.confirmed & (bank.weight[best] > SURE))
-    fresh: dict[int, int] = {}
-    hits = looks = 0
-    for family in now.tolist():
-        name, path = int(bank.number[family]), bank.path[:, best[family]].tolist()
-        if name in was:
-            if int(bank.looks[family]) == looked.get(name):
-                continue
-            looks += 1
-            hits += path[0] > 0
-            path = path[:1]
-        fresh |= {one: name for one in path if one and one not in told}
-    density = density.after(value, found.unexplained, share).detecting(hits, looks)
-    return Slice(index, tuple(plots), bank, density, fresh, found.left_out > 0)
-
-
-def _splitting(density: Density, options: Options) -> Splitting:
-    level = options.acceleration_sigma_mps2**2 * options.acceleration_time_s
-    upright = options.vertical_acceleration_sigma_mps2**2 * options.acceleration_time_s
-    speeds = GREATEST_LEVEL_MPS, GREATEST_LEVEL_MPS, GREATEST_CLIMB_MPS
-    return Splitting(
-        (level, level, upright),
-        speeds,
-        density.detection,
-        confirm_at=CONFIRM_AT,
-        least_weight=LEAST_WEIGHT,
-        budget=BUDGET,
-    )
-
-
-def _flying(bank: Bank, was: set[int], slowest_mps: float) -> Bank:
-    """The bank where only what was confirmed before, or surely flies faster than the slowest aircraft, is confirmed.
-
-    What moves slower with the wind is there and is followed, so that its plots begin nothing else: birds, rain's edges.
-    """
-    new = np.flatnonzero(bank.confirmed & ~np.isin(bank.number, np.array(sorted(was), dtype=np.int64)))
-    if not len(new) or slowest_mps <= 0.0:
-        return bank
-    row = bank.best[new]
-    velocity = bank.mean[3:, row]
-    speed = np.sqrt((velocity * velocity).sum(axis=0))
-    along = velocity / np.maximum(speed, 1e-9)
-    variance = np.einsum("an,abn,bn->n", along, bank.covariance[3:, 3:, row], along)
-    sure = speed - SURE_SIGMAS * np.sqrt(variance) > slowest_mps
-    confirmed = bank.confirmed.copy()
-    confirmed[new[~sure]] = False
-    return replace(bank, confirmed=confirmed)
 
 
 def _difference(
@@ -295,8 +189,8 @@ def _difference(
     by_serial = {plot.serial: plot for one in watch.slices for plot in one.plots}
     new = [serial for serial, family in told.items() if was.get(serial) != family and serial in by_serial]
     gone = [serial for serial, family in was.items() if told.get(serial) != family and serial in by_serial]
-    some = sorted((replace(by_serial[one], number=numbers[told[one]]) for one in new), key=_order)
-    back = sorted((replace(by_serial[one], number=numbers[was[one]]) for one in gone), key=_order)
+    some = sorted((replace(by_serial[one], number=numbers[told[one]]) for one in new), key=order_of)
+    back = sorted((replace(by_serial[one], number=numbers[was[one]]) for one in gone), key=order_of)
     untold = sum(plot.serial not in told for plot in heard)
     crowded = (heard[0].radar,) if any(one.crowded for one in after) else ()
     return replace(watch, numbers=numbers, next_number=following), Taken(tuple(some), tuple(back), untold, crowded)
