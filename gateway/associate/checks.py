@@ -32,7 +32,6 @@ class Associated:
     check_radar_track: tuple[str, ...]
     check_difference: Floats  # (k, 3) radar minus GPS: range m, azimuth rad, elevation rad; NaN = not compared
     check_gate: Floats  # (k, 3)
-    check_hit: NDArray[np.bool_]  # (k,)
     check_counter: Ints  # (k,) after the check
     pairs: tuple[tuple[str, str], ...]  # (aircraft, radar track)
     changes: tuple[Change, ...]
@@ -237,7 +236,6 @@ def table(
         check_radar_track=tuple(name_of(comparison.key) for _, comparison in rows),
         check_difference=np.array([comparison.difference for _, comparison in rows]).reshape(-1, 3),
         check_gate=np.array([comparison.gate for _, comparison in rows]).reshape(-1, 3),
-        check_hit=np.array([comparison.hit for _, comparison in rows], dtype=np.bool_),
         check_counter=np.array(counters, dtype=np.int64),
         pairs=ledger.spans.named_pairs,
         changes=tuple(changes),

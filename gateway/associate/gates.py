@@ -24,7 +24,6 @@ Bools = NDArray[np.bool_]
 GATE_SIGMAS = 3.0
 IMPOSSIBLE_SIGMAS = 4.0  # a guessed height can forbid a pair beyond this, never support one
 SILENT_S = 3.0  # a radar track without plots for this long gives its aircraft free
-NOWHERE: Polar = (math.nan, math.nan, math.nan)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -67,7 +67,6 @@ class Record:
     epoch_offset_s: int | None = None
     registration: Remembered | None = None  # what was known of the radars' errors at the start, from an earlier session
     registered: Remembered | None = None  # and what is known of them by now
-    flows: None = None
     sources: tuple[InputFile, ...] = ()
     counters: Mapping[str, int] = field(default_factory=dict)
     watermark: int | None = None

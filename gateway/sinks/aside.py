@@ -1,7 +1,7 @@
 """A sink that works in a thread of its own, so that what it waits for holds up no picture.
 
-To draw a hundred aircraft takes a quarter of a second, in another process (`apart`). Between two pictures that is far too
-long to wait for.
+Its one job is to wait for the process that draws (`apart`), which takes the load but answers late: to draw a hundred aircraft
+takes a quarter of a second, and between two pictures that is far too long.
 """
 
 from __future__ import annotations
