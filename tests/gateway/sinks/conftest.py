@@ -177,7 +177,6 @@ class _Maker:
             (RADAR_TRACK,) * checked,
             np.array([[20.0, 0.002, np.nan]] * checked).reshape(-1, 3),
             np.array([[200.0, 0.01, 0.01]] * checked).reshape(-1, 3),
-            np.array([True] * checked, dtype=np.bool_),
             np.array([min(round(time_s / 5.0), 3)] * checked, dtype=np.int64),
             ((AIRCRAFT, RADAR_TRACK),) if self.paired_at is not None else (),
             changes,
