@@ -72,7 +72,7 @@ def predict(state: Estimate, elapsed_s: Floats) -> Estimate:
 
 
 def ahead(state: Estimate, elapsed_s: Floats, fades_in_s: float) -> tuple[Three, Three]:
-    """Carried on through silences of (n,) seconds: means, and ss, sv, vv without the source error's part, while accelerations fade."""
+    """After silences of (n,) seconds, in which accelerations fade: means, and ss, sv, vv without the source error's part."""
     t = elapsed_s[:, None]
     mean = fading.moved((state.position, state.velocity, state.acceleration), t, fades_in_s)
     return mean, fading.spread(own_terms(state), t, shaken(state, state.density), fades_in_s)

@@ -64,6 +64,12 @@ MEAN_PERIOD_S = 1.0  # the paper's period: in this time the mean counts once, ho
 WINDOW = 5  # residuals that `literal` takes the mean of
 
 
+def level_turn_rate(speed_mps: Floats, bank_rad: float, least_rps: float) -> Floats:
+    """Turn rate (n,) in rad/s of level turns at a bank, at level speeds (n,); `least_rps` where this is more."""
+    banked = GRAVITY_MPS2 * math.tan(bank_rad) / np.maximum(speed_mps, LEAST_SPEED_MPS)
+    return np.asarray(np.maximum(banked, least_rps))
+
+
 @dataclass(frozen=True, slots=True)
 class Mode:
     """One way of moving. `turn` is a multiple of the set's turn rate: 0 is straight, positive to the left.
@@ -135,8 +141,7 @@ class Modes:
 
     def turn_rate(self, speed_mps: Floats) -> Floats:
         """Turn rate (n, m) in rad/s, positive to the left, of each mode at level speeds (n,)."""
-        banked = GRAVITY_MPS2 * math.tan(self.bank_rad) / np.maximum(speed_mps, LEAST_SPEED_MPS)
-        return np.asarray(np.maximum(banked, self.turn_rate_rps)[:, None] * self.numbers.turn)
+        return level_turn_rate(speed_mps, self.bank_rad, self.turn_rate_rps)[:, None] * self.numbers.turn
 
     def directions(self, weight: Floats) -> Floats:
         """Probabilities (n, 3) of flying straight, turning left, turning right, from the modes' weights (n, m)."""

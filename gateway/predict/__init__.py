@@ -1,11 +1,13 @@
 """Predict: where it will be, how sure that is, and why (paper 000, 2.2 and 2.3).
 
-`told` holds what aircraft say of their plans, `goals` makes candidates of it, `thinking` believes one of them or none, `minds`
-is what is remembered of each track meanwhile; `forecasting` is one round of predictions, `heights` and `spread` their third
-dimension and their sigmas, `table` the columns.
+`told` holds what aircraft say of their plans and `goals` makes candidates of it; `states` are where tracks are, `thinking` is how
+they move and how well each candidate fits, `choosing` takes one of them or none. `forecasting` is one round of predictions,
+`heights` and `spread` their third dimension and their sigmas, `table` the columns. `predicting` is what is remembered from round
+to round, `minds` that of each track.
 """
 
-from gateway.predict.forecasting import TOGETHER, Predicting, forecast
+from gateway.predict.forecasting import forecast
+from gateway.predict.predicting import TOGETHER, Predicting
 from gateway.predict.table import Forecast, Predicted, table
 from gateway.predict.told import Said
 

@@ -32,7 +32,10 @@ GO_AROUND_M = 5000.0  # beyond the runway's far end
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Goals:
-    """The c = COUNT candidates of one aircraft: route (c, 4, 2) east and north, up (c, 4), NaN = none; the first of each is the candidate."""
+    """The c = COUNT candidates of one aircraft: route (c, 4, 2) east and north, up (c, 4), NaN = none.
+
+    The first point of each route is the candidate.
+    """
 
     route: Floats
     up: Floats

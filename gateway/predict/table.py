@@ -19,6 +19,7 @@ Bools = NDArray[np.bool_]
 
 METHODS = ("model", "two segments")
 KINDS = (None, "inferred", "declared")
+NONE, INFERRED, DECLARED = range(3)  # places in them
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.align import SECOND
 from gateway.estimators import intent
 from gateway.estimators.intent import Belief, Inference, wrapped
 from gateway.predict.minds import UNKNOWN, Minds
@@ -16,7 +17,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-SECOND = 1_000_000_000
 INFERENCE = Inference()
 LEAST_SPEED_MPS = 3.0  # slower, a course says nothing
 STALE_S = 10.0  # after a gap as long as this the course begins anew

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from gateway.align import SECOND
 from gateway.observation import AirData, FlightPlan, Intent
 
-SECOND = 1_000_000_000
 AIRCRAFT_AT_MOST = 10_000  # a bound on what strangers can make us remember
 TELLERS = ("utm", "mission", "high latency")  # whoever stands first is believed first
 FORGOTTEN_AFTER = 3600 * SECOND  # of aircraft that are not tracked

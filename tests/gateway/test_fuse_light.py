@@ -295,7 +295,7 @@ def test_what_is_not_seen_is_known_less_and_less(world: Any) -> None:
 
 
 def test_an_acceleration_is_not_held_for_ever(world: Any) -> None:
-    """Who falls silent in a turn of 5 m/s2 is carried on to within 700 m of straight on after a minute; held, that would be 9 km."""
+    """Silent in a turn of 5 m/s2, after a minute it is within 700 m of straight on; held, that would be 9 km."""
     course = world.Course(swing_m=0.0)
     aside = [2.5 * max(0.2 * k - 10.0, 0.0) ** 2 for k in range(80)]
     sure = np.full(3, 1.0)

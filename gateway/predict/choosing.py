@@ -1,0 +1,189 @@
+"""Which way aircraft are expected to go: where they say, if they keep to it, else to an inferred point, else nobody knows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.estimators.intent import BELIEVED, USED_IN_TURN_RAD, Belief, Seen, to_turn, wrapped
+from gateway.estimators.two_segment import ON_CIRCLE, Circles
+from gateway.predict.goals import COUNT, GO_AROUND, RUNWAY, Goals
+from gateway.predict.minds import Minds
+from gateway.predict.table import DECLARED, INFERRED, NONE
+from gateway.predict.thinking import Motions, inferred, trusted
+from gateway.settings import Site
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+TRUSTED = 0.5  # a declared goal with this trust is flown to
+CIRCLE_LEAST, CIRCLE_MOST = 0.4, 2.0  # turn rate over that of a circle about the point: between them it is flown round
+FINAL_M = 30_000.0  # before the aiming point begins the final
+FINAL_RAD = math.radians(5.0)  # off the centreline as seen from the aiming point it is left
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chosen:
+    """Which way n aircraft are expected to go."""
+
+    route: Floats  # (n, 4, 2), NaN = the model's
+    up: Floats  # (n, 4)
+    lands: Bools  # (n, 4)
+    circles: Bools  # (n,) about a point, at a rate (n,)
+    rate: Floats
+    rounds: Circles
+    ends_round: Bools  # (n,) the route ends at a point that is flown round
+    best: Ints  # (n,) the candidate that is told, -1 = none
+    kind: Ints
+    confidence: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Declared:
+    """The candidates (n,) that n aircraft say they go to, -1 = none, since when, and how each is flown."""
+
+    place: Ints
+    since: Ints
+    goal: Floats  # (n, 2), NaN = none
+    circles: Bools
+    rounds: Bools  # at a radius that nobody says
+    radius: Floats  # NaN = it is not flown round, or at a radius that nobody says
+
+    @classmethod
+    def of(cls, goals: Sequence[Goals], routes: Floats) -> _Declared:
+        """As the goals have it."""
+        place = np.array([one.declared for one in goals], dtype=np.int64)
+        said = np.maximum(place, 0)
+        each = list(zip(goals, said.tolist(), strict=True))
+        return cls(
+            place,
+            np.array([one.declared_at for one in goals], dtype=np.int64),
+            np.where((place >= 0)[:, None], routes[np.arange(len(goals)), said, 0], math.nan),
+            np.array([one.circles[slot] for one, slot in each]),
+            np.array([one.rounds[slot] for one, slot in each]),
+            np.array([one.radius[slot, 0] for one, slot in each]),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Flown:
+    """How n aircraft fly to one candidate each, as `Goals` has it."""
+
+    up: Floats  # (n, 4)
+    lands: Bools  # (n, 4)
+    ends_round: Bools  # (n,)
+    radius: Floats  # (n, 4)
+    least: Floats  # (n, 4)
+
+    @classmethod
+    def of(cls, goals: Sequence[Goals], slots: Ints) -> _Flown:
+        """To these candidates (n,)."""
+        each = list(zip(goals, slots.tolist(), strict=True))
+        return cls(
+            np.stack([one.up[slot] for one, slot in each]),
+            np.stack([one.lands[slot] for one, slot in each]),
+            np.array([one.rounds[slot] for one, slot in each]),
+            np.stack([one.radius[slot] for one, slot in each]),
+            np.stack([one.least[slot] for one, slot in each]),
+        )
+
+
+def chosen(
+    before: Minds, minds: Minds, at: int, now: Motions, goals: Sequence[Goals], climb: Floats, site: Site
+) -> tuple[Chosen, Minds]:
+    """What is believed of n aircraft that climb so fast (n,), and what is thought of them from now on."""
+    routes = np.stack([one.route for one in goals])
+    declared = _Declared.of(goals, routes)
+    seen, belief, off = _inferred(before, at, now, goals, routes, climb, site)
+    trust = trusted(before, at, now, declared.goal, declared.circles, declared.since)
+    trusts = np.nan_to_num(trust) >= TRUSTED
+    left = to_turn(np.take_along_axis(np.nan_to_num(off), np.maximum(belief.best, 0)[:, None], axis=1), now.side)[:, 0]
+    infers = (
+        ~trusts & (belief.best >= 0) & (belief.direction > BELIEVED) & ((now.side == 0) | (left < USED_IN_TURN_RAD))
+    )
+    used, is_said = trusts | infers, declared.place >= 0
+    best = np.where(trusts, declared.place, np.where(infers | ~is_said, belief.best, declared.place))
+    kind = np.where(best < 0, NONE, np.where(best == declared.place, DECLARED, INFERRED))
+    confidence = np.where(kind == NONE, math.nan, np.where(kind == DECLARED, trust, belief.confidence))
+    circling, rate = _circling(now, declared.goal, trusts & declared.circles & declared.rounds)
+    circled = _circled(before, now, declared)
+    minds = replace(
+        minds,
+        agreed=seen.agreed,
+        length=seen.length,
+        last=seen.last,
+        turning=seen.turning,
+        flown_at=seen.flown_at,
+        trust=np.nan_to_num(trust),
+        declared_at=np.where(is_said, declared.since, before.declared_at),
+        circled=circled,
+    )
+    slots = np.maximum(best, 0)
+    flown = _Flown.of(goals, slots)
+    least = flown.least
+    least[:, 0] = np.maximum(least[:, 0] - np.where(best == declared.place, circled, 0.0), 0.0)
+    way = Chosen(
+        np.where((used & ~circling)[:, None, None], routes[np.arange(len(goals)), slots], math.nan),
+        np.where(used[:, None], flown.up, math.nan),
+        flown.lands & used[:, None],
+        circling,
+        rate,
+        Circles(np.where(used[:, None], flown.radius, math.nan), least),
+        flown.ends_round & used,
+        best,
+        kind,
+        confidence,
+    )
+    return way, minds
+
+
+def _inferred(
+    before: Minds, at: int, now: Motions, goals: Sequence[Goals], routes: Floats, climb: Floats, site: Site
+) -> tuple[Seen, Belief, Floats]:
+    """`thinking.inferred`, in which only who is on final lands or goes around."""
+    final = _on_final(now, site)
+    lowered = np.ones((len(goals), COUNT))
+    lowered[:, RUNWAY] = final
+    lowered[:, GO_AROUND] = final * _goes_around(now, climb, site)
+    return inferred(before, at, now, routes[:, :, 0], np.stack([one.planned for one in goals]), lowered)
+
+
+def _circling(now: Motions, centre: Floats, should: Bools) -> tuple[Bools, Floats]:
+    """Who flies round a point (n, 2) as it `should` (n,), and the rate (n,) of the turn that stays at its distance."""
+    way = centre - now.position
+    distance = np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1])
+    rate = now.speed / np.maximum(distance, 1.0)
+    to_left = np.where(way[:, 1] * now.velocity[:, 0] - way[:, 0] * now.velocity[:, 1] > 0.0, 1.0, -1.0)
+    turns_alike = (now.turn_rate * to_left > CIRCLE_LEAST * rate) & (now.turn_rate * to_left < CIRCLE_MOST * rate)
+    return should & turns_alike, to_left * rate
+
+
+def _circled(before: Minds, now: Motions, declared: _Declared) -> Floats:
+    """How far (n,) each aircraft has flown round its declared point, rad."""
+    way = declared.goal - now.position
+    near = np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1]) <= ON_CIRCLE * np.abs(declared.radius)
+    turned = np.abs(wrapped(now.course - before.courses[:, 0]))
+    return np.where(near & (before.declared_at == declared.since), before.circled + np.nan_to_num(turned), 0.0)
+
+
+def _on_final(now: Motions, site: Site) -> Bools:
+    """Who flies towards the runway along its centreline, (n,)."""
+    sine, cosine = math.sin(site.runway.landing_compass_rad), math.cos(site.runway.landing_compass_rad)
+    along = now.position[:, 0] * sine + now.position[:, 1] * cosine - site.runway.aiming_point_x_m
+    left = now.position[:, 1] * sine - now.position[:, 0] * cosine
+    flies = now.velocity[:, 0] * sine + now.velocity[:, 1] * cosine
+    aligned = flies > math.cos(math.radians(20.0)) * now.speed
+    return (along < 0.0) & (along > -FINAL_M) & (np.abs(left) < 100.0 - along * math.tan(FINAL_RAD)) & aligned
+
+
+def _goes_around(now: Motions, climb: Floats, site: Site) -> Floats:
+    """How much likelier (n,) the climb is of who goes around than of who goes on down."""
+    down = -now.speed * math.tan(site.runway.glide_path_rad)
+    lands = np.exp(-0.5 * ((climb - down) / 1.5) ** 2)
+    climbs = np.exp(-0.5 * ((np.minimum(climb, 2.0) - 2.0) / 1.5) ** 2)
+    return np.asarray(np.clip(climbs / np.maximum(lands, 1e-6), 0.01, 100.0))

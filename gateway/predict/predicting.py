@@ -1,0 +1,80 @@
+"""What predict remembers from one instant to the next, and which tracks are predicted when."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from gateway.align import SECOND
+from gateway.frames import RunwayFrame
+from gateway.fuse import Lane
+from gateway.predict.goals import Goals, goals_of
+from gateway.predict.minds import Remembered
+from gateway.predict.told import Said, Tellings
+from gateway.settings import Site
+
+TOGETHER = 150  # tracks that are predicted at once; of more, each part has its own instant within the second
+NEVER = 1 << 62
+
+
+@dataclass(frozen=True, slots=True)
+class Predicting:
+    """What predict remembers: what was said, what is thought of each track, and each aircraft's goals as arrays."""
+
+    tellings: Tellings = Tellings()
+    remembered: Remembered = field(default_factory=Remembered)
+    goals: Mapping[str | None, Goals] = field(default_factory=dict)  # by aircraft; None: of those that said nothing
+    separation_m: float = 0.0  # of the geoid, as the goals have it
+    planned: tuple[tuple[int, tuple[int, ...]], ...] = ()  # when which tracks are predicted next
+
+    @property
+    def due(self) -> int:
+        """When the next tracks are predicted."""
+        return self.planned[0][0] if self.planned else NEVER
+
+    def planning(self, tracks: Sequence[int], at: int) -> Predicting:
+        """The same with a round of predictions of these tracks, the first at an instant, the others within the second."""
+        parts = [tuple(tracks[first : first + TOGETHER]) for first in range(0, len(tracks), TOGETHER)]
+        return replace(
+            self, planned=tuple((at + place * SECOND // len(parts), part) for place, part in enumerate(parts))
+        )
+
+    def begun(self, at: int) -> tuple[Predicting, tuple[int, ...]]:
+        """The same without the part that is due at an instant, and its tracks."""
+        if self.due > at:
+            return self, ()
+        return replace(self, planned=self.planned[1:]), self.planned[0][1]
+
+    def hearing(self, said: Said) -> Predicting:
+        """The same with one thing more that an aircraft said."""
+        tellings = self.tellings.hearing(said)
+        if tellings is self.tellings:
+            return self
+        known = self.tellings.by_aircraft.get(said.aircraft)
+        now = tellings.by_aircraft[said.aircraft]
+        if known is not None and known.plan is now.plan and known.intents is now.intents:
+            return replace(self, tellings=tellings)
+        goals = {aircraft: one for aircraft, one in self.goals.items() if aircraft != said.aircraft}
+        return replace(self, tellings=tellings, goals=goals)
+
+    def with_goals(self, lanes: Sequence[Lane], site: Site, frame: RunwayFrame, separation_m: float) -> Predicting:
+        """The same with the goals of these tracks' aircraft made."""
+        goals = self.goals if separation_m == self.separation_m else {}
+        told = self.tellings.by_aircraft
+        wanted = {lane.aircraft if lane.aircraft in told else None for lane in lanes}
+        missing = [one for one in wanted if one not in goals]
+        if not missing:
+            return self
+        made = {one: goals_of(told.get(one) if one else None, site, frame, separation_m) for one in missing}
+        return replace(self, goals={**goals, **made}, separation_m=separation_m)
+
+    def forgotten(self, lanes: Mapping[int, Lane], by_aircraft: Mapping[str, int], at: int) -> Predicting:
+        """The same without what is said of aircraft, and thought of tracks, that are long gone."""
+        tellings = self.tellings.remembered(by_aircraft, at)
+        goals = self.goals
+        if len(tellings.by_aircraft) < len(self.tellings.by_aircraft):
+            goals = {one: goal for one, goal in goals.items() if one is None or one in tellings.by_aircraft}
+        if not lanes:
+            return Predicting(tellings)
+        remembered = self.remembered.without(lanes)
+        return replace(self, tellings=tellings, goals=goals, remembered=remembered)
