@@ -67,6 +67,7 @@ class Record:
     epoch_offset_s: int | None = None
     registration: Remembered | None = None  # what was known of the radars' errors at the start, from an earlier session
     registered: Remembered | None = None  # and what is known of them by now
+    flows: None = None  # other programs look for it; null until predictions know arrival flows
     sources: tuple[InputFile, ...] = ()
     counters: Mapping[str, int] = field(default_factory=dict)
     watermark: int | None = None
