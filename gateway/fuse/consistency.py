@@ -163,8 +163,12 @@ def _told(rows: Rows, events: Sequence[Event], position: PositionSource, radars:
     for number, part in enumerate(PLOT if is_plot else REPORT):
         stated = sigma[:, part.first]
         is_set = (np.abs(stated - said[:, number]) <= 1e-9 * stated).tolist()
-        keys = [(source, part.name, one) for source, one in zip(sources, is_set, strict=True)]
-        found.append(Told(part, keys, measures, stated, evidence(left, new, stated, part)))
+        weighed = evidence(left, new, stated, part)
+        some = np.flatnonzero(
+            weighed.any(axis=1)
+        )  # the first measurements of a source tell nothing: no noise is watched yet
+        keys = [(sources[row], part.name, is_set[row]) for row in some.tolist()]
+        found.append(Told(part, keys, [measures[row] for row in some.tolist()], stated[some], weighed[some]))
     return found
 
 
