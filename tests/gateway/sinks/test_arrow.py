@@ -44,7 +44,8 @@ def test_tables_have_the_columns_that_other_programs_read(tmp_path, pictures):
     assert tracks.field("covariance").type.list_size == 36
     predictions = pq.read_schema(tmp_path / "predictions.parquet")
     assert " ".join(predictions.names) == (
-        "made track valid horizon_s latitude_deg longitude_deg height_m sigma_m method intent intent_kind confidence"
+        "made track valid horizon_s latitude_deg longitude_deg height_m sigma_m method intent intent_kind confidence "
+        "sigma_along_m sigma_across_m course_deg"
     )
     truth = pq.read_schema(tmp_path / "truth.parquet")
     assert " ".join(truth.names) == (
