@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.estimators.circling import ON_CIRCLE, Circles
 from gateway.estimators.intent import BELIEVED, USED_IN_TURN_RAD, Belief, Seen, to_turn, wrapped
-from gateway.estimators.two_segment import ON_CIRCLE, Circles
 from gateway.predict.goals import COUNT, GO_AROUND, RUNWAY, Goals
 from gateway.predict.minds import Minds
 from gateway.predict.table import DECLARED, INFERRED, NONE

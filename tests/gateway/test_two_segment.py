@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from gateway.estimators.two_segment import Ahead, Circles, Moving, Rule, ahead, angle_to_go
+from gateway.estimators.circling import Circles
+from gateway.estimators.turns_and_straights import angle_to_go
+from gateway.estimators.two_segment import Ahead, Moving, Rule, ahead
 
 DEG = math.pi / 180.0
 RATE = 3.0 * DEG

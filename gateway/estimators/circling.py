@@ -1,0 +1,75 @@
+"""Points of a route that are flown round, as missions' loiters are: where their circles are entered, and for how long flown.
+
+Deviation: 000 2.3 knows only points that are flown to.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.estimators.turns_and_straights import FULL_TURN, Path, angle_to_go
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+ON_CIRCLE = 1.3  # radii: who is this near to a circle's middle is on it
+FOR_GOOD_RAD = 1000.0
+QUARTERS, QUARTER_RAD = 8, 0.5 * math.pi  # of a circle: two turns, and all that is left at once
+
+
+@dataclass(frozen=True, slots=True)
+class Circles:
+    """Which of n routes' p points are flown round: radius (n, p), positive to the left, NaN = it is flown by; how far (n, p).
+
+    `least` is the angle after which it is left, as soon as the course points at the next point; infinite = never.
+    """
+
+    radius: Floats
+    least: Floats
+
+
+def entered(path: Path, point: Floats, circles: Circles | None, leg: int) -> tuple[Floats, Bools]:
+    """What a leg is flown at (n, 2): its point, or where its circle is entered; and who (n,) is on that circle already."""
+    if circles is None:
+        return point, np.zeros(len(point), dtype=np.bool_)
+    radius = np.abs(circles.radius[:, leg])
+    way = point - path.position
+    distance = np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1])
+    round_it = ~np.isnan(radius)
+    arrived = round_it & (distance <= ON_CIRCLE * radius)
+    sine = np.where(round_it & ~arrived, radius / np.maximum(distance, 1e-9), 0.0)
+    towards = np.arctan2(way[:, 1], way[:, 0]) - np.sign(circles.radius[:, leg]) * np.arcsin(np.minimum(sine, 1.0))
+    length = distance * np.sqrt(np.maximum(1.0 - sine * sine, 0.0))
+    entry = path.position + length[:, None] * np.stack([np.cos(towards), np.sin(towards)], axis=-1)
+    return np.where((round_it & ~arrived)[:, None], entry, point), arrived
+
+
+def go_round(path: Path, circles: Circles, leg: int, following: Floats, speed_on: Callable[[Floats], Floats]) -> None:
+    """Round a leg's circle, where it has one, until the next point is ahead and the least angle is flown.
+
+    In quarters, each at the ground speed of its middle.
+    """
+    radius = circles.radius[:, leg]
+    round_it = ~np.isnan(radius)
+    if not round_it.any():
+        return
+    way = following[:, leg] - path.position
+    distance = np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1])
+    near = (distance > 0.5 * np.abs(radius)) & (distance <= ON_CIRCLE * np.abs(radius))
+    size = np.where(near, distance, np.abs(radius))  # who is on it stays at the distance that he has
+    size, side = np.where(round_it, size, 1.0), np.sign(np.where(round_it, radius, 1.0))
+    go = np.nan_to_num(angle_to_go(path.position, path.course, size, side, following[:, leg + 1]))
+    least = np.minimum(np.where(round_it, circles.least[:, leg], 0.0), FOR_GOOD_RAD)
+    go = go + FULL_TURN * np.ceil(np.maximum(least - go, 0.0) / FULL_TURN)
+    last = (following[:, leg + 1] == following[:, leg]).all(axis=1)
+    go = np.where(round_it, np.where(last, FOR_GOOD_RAD, go), 0.0)
+    for quarter in range(QUARTERS):
+        arc = np.minimum(go, QUARTER_RAD) if quarter + 1 < QUARTERS else go
+        ground = speed_on(path.course + 0.5 * side * np.minimum(arc, QUARTER_RAD))
+        path.extend(ground, np.where(round_it, side * ground / size, 0.0), arc * size / ground, leg)
+        go = go - arc
