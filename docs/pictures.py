@@ -57,7 +57,9 @@ def main() -> None:
         errors = [part for change in REGISTERED for part in ("--set", change)]
         talkdown("simulate", "traffic", *errors, "--seed", "3", "--speed", "max", "--archive", work / "off")
         talkdown("replay", only_session(work / "off"), "--viewer", "none", "--archive", work / "registered")
-        draw(only_session(work / "registered") / "session.rrd", "registration", "--at", "0.97", "--page", "Registration")
+        draw(
+            only_session(work / "registered") / "session.rrd", "registration", "--at", "0.97", "--page", "Registration"
+        )
         site = work / "field.toml"
         site.write_text(talkdown("site", FLIGHT), encoding="utf-8")
         talkdown("simulate", "radar", "--watch", FLIGHT, "--site", site, "--archive", work / "seen")

@@ -47,9 +47,7 @@ class State:
         return self.registration.to_remember(self.radars, at, where)
 
 
-def initial(
-    site: Site, options: Options = Options(), remembered: Remembered | None = None, began: int = 0
-) -> State:
+def initial(site: Site, options: Options = Options(), remembered: Remembered | None = None, began: int = 0) -> State:
     """The state before the first arrival. `remembered`: of the site's radars, older by now, `began`, ns since 1970 UTC."""
     radars = {radar.number: radar for radar in site.radars}
     age_s = 0.0 if remembered is None else remembered.age_s(began)
