@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.mavlink_frames import FrameEncoder
+from gateway.estimators.inertial import from_angles
+from gateway.geodesy import wrap_rad
 from sim.earth import Flown
 from sim.scene import Aircraft, Scene
 from sim.sensors import GpsMeasured, gps_phases, gps_times, measure_gps, stream
@@ -108,7 +110,7 @@ def _clocks(scene: Scene, aircraft: Aircraft) -> _Sayings:
 def _attitudes(scene: Scene, aircraft: Aircraft) -> _Sayings:
     ticks = _ticks(scene, aircraft, scene.say.attitude_period_s)
     flown = scene.flown(aircraft, ticks)
-    yaw = np.remainder(flown.yaw_rad + math.pi, 2.0 * math.pi) - math.pi
+    yaw = wrap_rad(flown.yaw_rad)
 
     def fields(index: int) -> Fields:
         return {
@@ -130,15 +132,18 @@ def _truths(scene: Scene, aircraft: Aircraft) -> list[_Sayings]:
         return []
     ticks = _ticks(scene, aircraft, scene.say.truth_period_s)
     flown = scene.flown(aircraft, ticks)
-    return [_Sayings("SIM_STATE", ticks + scene.say.latency_s, lambda index: _sim_state(scene, flown, index))]
+    stands = from_angles(flown.roll_rad, flown.pitch_rad, flown.yaw_rad)
+    return [
+        _Sayings("SIM_STATE", ticks + scene.say.latency_s, lambda index: _sim_state(scene, flown, stands[index], index))
+    ]
 
 
-def _sim_state(scene: Scene, flown: Flown, index: int) -> Fields:
+def _sim_state(scene: Scene, flown: Flown, attitude: Floats, index: int) -> Fields:
     roll, pitch, yaw = (float(angle[index]) for angle in (flown.roll_rad, flown.pitch_rad, flown.yaw_rad))
     latitude_deg, longitude_deg = math.degrees(flown.latitude_rad[index]), math.degrees(flown.longitude_rad[index])
     east, north, up = (float(part) for part in flown.velocity_mps[index])
     return {
-        **dict(zip(("q1", "q2", "q3", "q4"), _quaternion(roll, pitch, yaw), strict=True)),
+        **dict(zip(("q1", "q2", "q3", "q4"), attitude.tolist(), strict=True)),
         **{"roll": roll, "pitch": pitch, "yaw": yaw},
         **dict.fromkeys(("xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro"), 0.0),
         "lat": latitude_deg,
@@ -152,17 +157,6 @@ def _sim_state(scene: Scene, flown: Flown, index: int) -> Fields:
         "lat_int": round(latitude_deg * 1e7),
         "lon_int": round(longitude_deg * 1e7),
     }
-
-
-def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
-    """The attitude as a unit quaternion w, x, y, z, from north-east-down to the body."""
-    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(0.5 * a), math.sin(0.5 * a)) for a in (roll, pitch, yaw))
-    return (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
 
 
 def reports(scene: Scene, aircraft: Aircraft) -> GpsMeasured:

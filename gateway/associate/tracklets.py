@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND, Plot
 from gateway.frames import RadarFrame, turn, xyz_from_polar
+from gateway.geodesy import wrap_rad
 from gateway.track import Key, RadarTracks
 
 Floats = NDArray[np.float64]
@@ -119,7 +120,7 @@ def _parabolas(plots: _Plots) -> tuple[Floats, Floats, Floats]:
     first = np.take_along_axis(polar, known.argmax(axis=1)[:, None, :], axis=1)  # (k, 1, 3) the first that is known
     first = np.where(np.isnan(first), UNKNOWN_ELEVATION_RAD[0], first)
     off = np.where(known, polar - first, 0.0)
-    off[:, :, 1] = np.remainder(off[:, :, 1] + math.pi, 2.0 * math.pi) - math.pi
+    off[:, :, 1] = wrap_rad(off[:, :, 1])
     weight = np.where(known, plots.sigma**-2.0, 0.0)
     information, vector = np.zeros((count, 3, 3, 3)), np.zeros((count, 3, 3))
     powers = (np.ones_like(time_s), time_s, 0.5 * time_s**2)

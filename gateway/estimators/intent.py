@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators.modes import Modes
+from gateway.geodesy import wrap_rad
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -32,6 +33,9 @@ ROLL_OUT_RAD = math.radians(15.0)
 TURN_SURE = 0.9  # a turn less sure than this does not make forget what the straight before it said
 BELIEVED = 0.6  # an inferred point with this share of the weight is believed
 USED_IN_TURN_RAD = math.radians(25.0)  # but not in a turn that would have to go on further than this
+ALIGNED_RAD = math.radians(7.5)  # a point this close to the course is flown at
+# the rates of entering and leaving turns with the point ahead, to those without
+ENTERS, LEAVES = 0.02 / 0.03, 0.10 / 0.03
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,11 +94,6 @@ class Belief:
     confidence: Floats
     share: Floats
     direction: Floats
-
-
-def wrapped(angle: Floats) -> Floats:
-    """Angles in [-pi, pi)."""
-    return np.asarray(np.remainder(angle + math.pi, FULL_TURN) - math.pi)
 
 
 def off_course(position: Floats, velocity: Floats, points: Floats) -> Floats:
@@ -163,16 +162,9 @@ def believed(weight: Floats, off: Floats, inference: Inference) -> Belief:
     total = usable.sum(axis=1) + rest
     share = usable / np.where(total > 0.0, total, 1.0)[:, None]
     confidence = share.max(axis=1)
-    near = np.abs(wrapped(off - np.take_along_axis(off, best[:, None], axis=1))) <= ALIGNED_RAD
+    near = np.abs(wrap_rad(off - np.take_along_axis(off, best[:, None], axis=1))) <= ALIGNED_RAD
     direction = np.where(near, share, 0.0).sum(axis=1)
     return Belief(np.where(confidence > 0.0, best, -1), confidence, share, direction)
-
-
-ALIGNED_RAD = math.radians(7.5)  # a point this close to the course is flown at
-ENTERS, LEAVES = (
-    0.02 / 0.03,
-    0.10 / 0.03,
-)  # the rates of entering and leaving turns with the point ahead, to those without
 
 
 def transition(modes: Modes, elapsed_s: Floats, aligned: Bools) -> Floats:

@@ -19,9 +19,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.estimators import intent
 from gateway.estimators.circling import Circles, entered, go_round
-from gateway.estimators.intent import wrapped
 from gateway.estimators.turns_and_straights import Path, angle_to_go
+from gateway.geodesy import wrap_rad
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -29,7 +30,6 @@ Rule = Literal["literal", "default"]
 
 STRAIGHT_RPS = 1e-9  # slower turns are none
 ALIGNED_RAD = math.radians(0.5)  # a turn by less is a straight
-LITERAL_ALIGNED_RAD = math.radians(7.5)  # `literal` turns to a point this close to its course, and knows no other way
 ROLL_OUT_RAD = math.radians(45.0)  # who is no more than this beyond its point turns back to it
 MOST_LEAD = 2.0  # radii: no turn begins earlier before its point
 LEAST_SPEED_MPS = 0.1
@@ -160,7 +160,7 @@ def _first_turn(
     go = angle_to_go(now.position, course, speed / np.abs(rate), np.sign(rate), target)
     turn = np.where(~turns & (np.abs(off) <= ALIGNED_RAD), 0.0, np.nan_to_num(go))
     if rule == "literal":
-        return turn, rate, known & np.where(turns, ~np.isnan(go), np.abs(off) <= LITERAL_ALIGNED_RAD)
+        return turn, rate, known & np.where(turns, ~np.isnan(go), np.abs(off) <= intent.ALIGNED_RAD)
     there_is_more = (following[:, 0] != following[:, -1]).any(axis=1)  # inside the circle: it is all but there
     return turn, rate, known & (~np.isnan(go) | there_is_more | (turn == 0.0) & (np.abs(off) <= ALIGNED_RAD))
 
@@ -179,7 +179,7 @@ def _straight(path: Path, target: Floats, following: Floats, radius: Floats) -> 
     way = target - path.position
     distance = np.nan_to_num(way[:, 0] * np.cos(path.course) + way[:, 1] * np.sin(path.course))
     further = following[:, 1] - following[:, 0]
-    turn = wrapped(np.arctan2(further[:, 1], further[:, 0]) - path.course)
+    turn = wrap_rad(np.arctan2(further[:, 1], further[:, 0]) - path.course)
     entering = (target != following[:, 0]).any(axis=1)  # a circle: it is not cut short
     turn = np.where((further == 0.0).all(axis=1) | np.isnan(turn) | entering, 0.0, np.abs(turn))
     lead = radius * np.minimum(np.tan(0.5 * np.minimum(turn, 0.75 * math.pi)), MOST_LEAD)
@@ -189,4 +189,4 @@ def _straight(path: Path, target: Floats, following: Floats, radius: Floats) -> 
 def _off(position: Floats, course: Floats, point: Floats) -> Floats:
     """How far to the left (n,) of a course a point lies, in [-pi, pi)."""
     way = point - position
-    return wrapped(np.arctan2(way[:, 1], way[:, 0]) - course)
+    return wrap_rad(np.arctan2(way[:, 1], way[:, 0]) - course)

@@ -16,13 +16,12 @@ from gateway.estimators.registration_frames import System, per_metre
 from gateway.frames import RadarFrame, RunwayFrame, polar_from_xyz, polar_jacobian, turn
 from gateway.fuse.weighting import polar_difference
 from gateway.offline.pairing import Gathering
-from gateway.register.verdicts import NAMES, Verdict
+from gateway.register.verdicts import NAMES, PRIOR_CHI_SQUARE, Verdict
 from gateway.settings import RadarSite, Site, with_radar
 
 Floats = NDArray[np.float64]
 
 LEAST_PAIRS = 10
-PRIOR_CHI_SQUARE = 16.3  # three degrees of freedom, 99.9 %
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators.circling import ON_CIRCLE, Circles
-from gateway.estimators.intent import BELIEVED, USED_IN_TURN_RAD, Belief, Seen, to_turn, wrapped
+from gateway.estimators.intent import BELIEVED, USED_IN_TURN_RAD, Belief, Seen, to_turn
+from gateway.geodesy import wrap_rad
 from gateway.predict.goals import COUNT, GO_AROUND, RUNWAY, Goals
 from gateway.predict.minds import Minds
 from gateway.predict.table import DECLARED, INFERRED, NONE
@@ -167,7 +168,7 @@ def _circled(before: Minds, now: Motions, declared: _Declared) -> Floats:
     """How far (n,) each aircraft has flown round its declared point, rad."""
     way = declared.goal - now.position
     near = np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1]) <= ON_CIRCLE * np.abs(declared.radius)
-    turned = np.abs(wrapped(now.course - before.courses[:, 0]))
+    turned = np.abs(wrap_rad(now.course - before.courses[:, 0]))
     return np.where(near & (before.declared_at == declared.since), before.circled + np.nan_to_num(turned), 0.0)
 
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND
 from gateway.estimators import intent
-from gateway.estimators.intent import Belief, Inference, wrapped
+from gateway.estimators.intent import Belief, Inference
+from gateway.geodesy import wrap_rad
 from gateway.predict.minds import UNKNOWN, Minds
 
 Floats = NDArray[np.float64]
@@ -24,10 +25,8 @@ LEAST_RATE_RPS = math.radians(0.75)  # a slower turn is none
 SURE_SIGMAS = 3.0
 STILL_THERE_RAD = math.radians(12.0)  # sigma of the course now about the direction to an inferred point
 SPEED_SIGMAS = 1.5
-WANDER_MEMORY_S, WANDERS_LESS = (
-    20.0,
-    3.0,
-)  # a filter's velocity is wrong by no more than so often what it changes by in a second
+WANDER_MEMORY_S = 20.0
+WANDERS_LESS = 3.0  # a filter's velocity is wrong by no more than so often what it changes by in a second
 SURE_AT_MOST = 0.25  # but by no less than this share of what the filter says
 UNSETTLED_S = 8.0  # how long a turn is felt
 
@@ -75,7 +74,7 @@ def motions(
     fresh = (elapsed_s > STALE_S) | (elapsed_s <= 0.0)
     older = np.where(np.isnan(before.courses[:, 1]), before.courses[:, 0], before.courses[:, 1])
     span_s = np.where(np.isnan(before.courses[:, 1]), elapsed_s, elapsed_s + before.interval_s)
-    measured = np.where(fresh, 0.0, wrapped(course - older) / np.where(fresh, 1.0, span_s))
+    measured = np.where(fresh, 0.0, wrap_rad(course - older) / np.where(fresh, 1.0, span_s))
     measured = np.where(speed < LEAST_SPEED_MPS, 0.0, measured)
     sigma = math.sqrt(2.0) * velocity_sigma / np.maximum(speed, LEAST_SPEED_MPS) / np.where(fresh, 1.0, span_s)
     by_modes = np.where(np.isnan(sides[:, 0]), 0, np.array([0, 1, -1])[np.nan_to_num(sides).argmax(axis=1)])
@@ -92,7 +91,7 @@ def motions(
     wander = _wander(before, speed, fresh, period_s)
     steady = np.where(np.isnan(wander), math.inf, WANDERS_LESS * np.sqrt(np.nan_to_num(wander)))
     course_sigma = velocity_sigma / np.maximum(speed, LEAST_SPEED_MPS)
-    turned = np.where(fresh | (speed < LEAST_SPEED_MPS), 0.0, np.abs(wrapped(course - before.courses[:, 0])))
+    turned = np.where(fresh | (speed < LEAST_SPEED_MPS), 0.0, np.abs(wrap_rad(course - before.courses[:, 0])))
     turned = turned**3 / np.maximum(turned * turned + (2.0 * course_sigma) ** 2, 1e-12)  # as far as it is no noise
     unsettled = np.where(fresh, 0.0, before.unsettled * np.exp(-period_s / UNSETTLED_S)) + turned
     minds = replace(

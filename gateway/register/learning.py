@@ -29,13 +29,12 @@ from gateway.register.choosing import LEAST_PAIRS, Choice, chosen
 from gateway.register.corrections import Steps, largest_step, stated
 from gateway.register.pairing import Gathered
 from gateway.register.remembered import Remembered, RememberedRadar, in_words
-from gateway.register.verdicts import FEW, NAMES, SIGNIFICANT, SIGNIFICANT_OF_FEW, Verdict
+from gateway.register.verdicts import FEW, NAMES, PRIOR_CHI_SQUARE, SIGNIFICANT, SIGNIFICANT_OF_FEW, Verdict
 from gateway.register.watching import Watch
 from gateway.settings import PositionSource, RadarSite, Registering
 
 Floats = NDArray[np.float64]
 
-PRIOR_CHI_SQUARE = 16.3  # three degrees of freedom, 99.9 %
 PAST_CHI_SQUARE = 30.0  # four; it is looked at every few seconds, and has to be so twice
 FADES_S = 1200.0  # time constant, over seconds in which something was learnt
 SOLVED_EACH_NS = 5 * SECOND

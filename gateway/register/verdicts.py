@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+PRIOR_CHI_SQUARE = 16.3  # of the common error against its prior: three degrees of freedom, 99.9 %
 SIGNIFICANT = 3.0  # sigmas
 # Of so few aircraft it takes more: their own errors are then half of what is found, it is looked at again and again, and what
 # is taken off wrongly does harm where a little that is left does none.

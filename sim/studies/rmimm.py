@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.estimators import intent
 from gateway.estimators.kalman import SIZE, Estimate, Motion, start
 from gateway.estimators.modes import Mixture, Mode, Modes, Rule, begin, combine, predict, update
 from sim.studies import Progress, Study, Table, silent
@@ -31,7 +32,6 @@ SETTLED_S = (30, 30, 30, 20, 30)  # after a change this long is not counted wher
 COUNTED_FROM_S = 50  # for errors
 # where the flight is going up to each time: a point this many seconds beyond, straight on (000 2.2 and 3)
 POINTS = ((100, 40.0), (300, 30.0), (END_S, 20.0))
-ALIGNED_RAD = math.radians(7.5)
 # from straight, left, right to the same, over a second; whoever leaves a turn with the point ahead rolls out
 ALIGNED = np.array([[0.98, 0.01, 0.01], [0.10, 0.90, 0.00], [0.10, 0.00, 0.90]])
 NOT_ALIGNED = np.full((3, 3), 0.5 * (1.0 - STAYS)) + (1.5 * STAYS - 0.5) * np.eye(3)
@@ -200,9 +200,8 @@ _LEVEL = [0, 1, 3, 4]
 def _towards(mixture: Mixture, point: Floats) -> Floats:
     """Transitions (n, m, m) over a second with a known point: who flies at it goes straight. Source: 000 2.2, feedback."""
     state = combine(mixture)
-    way = point - state.mean[:, :2]
-    off = np.arctan2(way[:, 1], way[:, 0]) - np.arctan2(state.mean[:, 4], state.mean[:, 3])
-    aligned = np.abs(np.remainder(off + math.pi, 2.0 * math.pi) - math.pi) <= ALIGNED_RAD
+    off = intent.off_course(state.mean[:, :2], state.mean[:, 3:5], point[None, None])
+    aligned = np.abs(off[:, 0]) <= intent.ALIGNED_RAD
     return np.where(aligned[:, None, None], ALIGNED, NOT_ALIGNED)
 
 
