@@ -14,6 +14,7 @@ from rich.table import Table
 
 from bench.clutter import clutter
 from bench.estimation import estimation
+from bench.foretelling import foretelling
 from bench.hundred_hours import HEADINGS, hundred_hours
 from bench.live_fleet import live_fleet
 from bench.live_rates import live_rates
@@ -46,6 +47,7 @@ class Part(StrEnum):
     estimation = "estimation"
     clutter = "clutter"
     registration = "registration"
+    foretelling = "foretelling"
     fleet = "fleet"
     memory = "memory"
     hours = "hours"
@@ -111,6 +113,9 @@ def _measure(wanted: set[Part], runs: int, seconds: float, traffic_hours: int, c
         if Part.registration in wanted:
             say("10 000 pairs of registration, and 1000 a second")
             figures += registration(min(runs, 5))
+        if Part.foretelling in wanted:
+            say("predictions of 1000 aircraft that have told their plans")
+            figures += foretelling(2 * runs)
         if Part.fleet in wanted:
             say("100 vehicles with two radars, and 1000 aircraft, live")
             figures += live_fleet(RATES_S)

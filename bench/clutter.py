@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import subprocess
 import sys
 from collections.abc import Callable
 from typing import Any
 
-from bench.measure import ChildFailed, Figure, environment
+from bench.measure import Figure, alone
 
 SIZES = {2: (30, 9), 10: (30, 9), 50: (25, 3), 200: (15, 1)}  # targets: scans of a run, and runs at most
 JOINT_RATIO, NEAREST_RATIO = {2: 20.0, 50: 200.0, 200: 200.0}, {50: 50.0, 200: 50.0}
@@ -25,12 +24,7 @@ PAPER_SCANS, PAPER_RATIO = 40, 4.0
 
 def clutter(runs: int, say: Callable[[str], None]) -> list[Figure]:
     """CPU milliseconds a scan by targets and side, the ratios to ours, and how many times the GOSPA of others ours has."""
-    alone = {**environment(), "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    command = [sys.executable, "-W", "ignore", "-m", "bench.clutter", str(runs)]
-    ended = subprocess.run(command, capture_output=True, text=True, env=alone, check=False)
-    if ended.returncode != 0:
-        raise ChildFailed(f"{' '.join(command)} ended with {ended.returncode}: {ended.stderr[-2000:]}")
-    told: dict[str, Any] = json.loads(ended.stdout)
+    told: dict[str, Any] = json.loads(alone([sys.executable, "-W", "ignore", "-m", "bench.clutter", str(runs)]))
     for sentence in told["left out"]:
         say(sentence)
     figures = []

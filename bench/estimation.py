@@ -9,12 +9,11 @@ all combined states after every report. What is not installed is left out and sa
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from collections.abc import Callable
 from typing import Any
 
-from bench.measure import ChildFailed, Figure, environment
+from bench.measure import Figure, alone
 
 BATCH_RATIO, ONE_RATIO = 60.0, 1.0
 AGREE = 1e-9
@@ -22,13 +21,7 @@ AGREE = 1e-9
 
 def estimation(runs: int, say: Callable[[str], None]) -> list[Figure]:
     """Track-steps a CPU second for one track and for a thousand, the ratios to the textbook, and how far sides differ."""
-    # One thread: CPU time of others in the same library would count for nothing.
-    alone = {**environment(), "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", "bench.estimation", str(runs)]
-    ended = subprocess.run(command, capture_output=True, text=True, env=alone, check=False)
-    if ended.returncode != 0:
-        raise ChildFailed(f"{' '.join(command)} ended with {ended.returncode}: {ended.stderr[-2000:]}")
-    told: dict[str, Any] = json.loads(ended.stdout)
+    told: dict[str, Any] = json.loads(alone([sys.executable, "-m", "bench.estimation", str(runs)]))
     for sentence in told["left out"]:
         say(sentence)
     figures = []

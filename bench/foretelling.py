@@ -1,94 +1,67 @@
-"""What a round of predictions costs: many aircraft, each with twenty candidates, at four horizons, in CPU.
+"""What a round of predictions costs: a thousand aircraft that have told their plans, at four horizons, in CPU.
 
-    python -m bench.foretelling [AIRCRAFT]
+python -m bench.foretelling ROUNDS       prints, as JSON, milliseconds of whole rounds, and of their longest parts
 
-Every aircraft has a plan of ten points and says which it goes to; the site publishes four points more; home, the runway and a
-go-around are candidates too, and there are places for ways around weather. Printed: the whole round, and its longest part.
+Estimators take turns, round by round. A part is what is predicted at once, and holds everything else up.
 """
 
 from __future__ import annotations
 
+import json
 import sys
 import time
-from statistics import median
+from typing import Any
 
-import numpy as np
+from bench.measure import Figure, alone
 
-from gateway import predict
-from gateway.fuse.weighting import Model
-from gateway.observation import FlightPlan, GpsReport, Heard, Intent, Observation, PlanPoint
-from gateway.pipeline import initial, step
-from gateway.predict import TOGETHER, table
-from gateway.settings import DEMO_SITE, Options, Waypoint
-from gateway.state import State
-
-HORIZONS_S = (10.0, 30.0, 60.0, 120.0)
-ROUNDS = 9
-SECOND = 1_000_000_000
-STARTS = 1_767_225_600 * SECOND
+ESTIMATORS = ("kalman", "rmimm")
+AIRCRAFT, HORIZONS_S = 1000, (10.0, 30.0, 60.0, 120.0)
+ROUND_MS, PART_MS = 50.0, 10.0
 
 
-def crowd(aircraft: int, options: Options) -> State:
-    """Aircraft that have reported for three seconds and told their plans."""
-    runway = DEMO_SITE.runway
-    chance = np.random.default_rng(1)
-    places = chance.uniform(-0.4, 0.4, (aircraft, 11, 2)) + np.degrees([runway.latitude_rad, runway.longitude_rad])
-    waypoints = tuple(Waypoint(f"W{place}", *np.radians([31.0 + 0.1 * place, 103.8])) for place in range(4))
-    state = initial(type(DEMO_SITE)(DEMO_SITE.name, runway, DEMO_SITE.position, waypoints=waypoints), options)
-    said: list[Observation] = []
-    for number, (first, *others) in enumerate(np.radians(places).tolist()):
-        name = f"mavlink:{number + 1}"
-        home = PlanPoint(0, "home", first[0], first[1], altitude_msl_m=500.0)
-        points = [PlanPoint(k, "waypoint", one[0], one[1], altitude_msl_m=900.0) for k, one in enumerate(others, 1)]
-        said += [FlightPlan(name, STARTS, STARTS, (home, *points)), Intent(name, STARTS, STARTS, "mission", 1)]
-    heard = [Heard(STARTS + 1, tuple(said))]
-    for tenth in range(1, 31):
-        at = STARTS + tenth * SECOND // 10
-        heard.append(Heard(at, tuple(_report(number, place[0], at, tenth / 10) for number, place in enumerate(places))))
-    return step(state, heard)[0]
+def foretelling(rounds: int) -> list[Figure]:
+    """Predictions of 1000 aircraft at four horizons, once a second: the whole round, and its longest part."""
+    told: dict[str, Any] = json.loads(alone([sys.executable, "-m", "bench.foretelling", str(rounds)]))
+    figures = []
+    for estimator, (whole, longest) in told.items():
+        name = f"predictions, {AIRCRAFT} aircraft, {len(HORIZONS_S)} horizons, {estimator}"
+        figures += [Figure(name, "ms", tuple(whole), ROUND_MS), Figure("… at once", "ms", tuple(longest), PART_MS)]
+    return figures
 
 
-def _report(number: int, place: np.ndarray[tuple[int], np.dtype[np.float64]], at: int, since_s: float) -> GpsReport:
-    """Northward at 80 m/s."""
-    latitude, longitude = np.radians(place)
-    north = 80.0 * since_s / 6.37e6
-    name = f"mavlink:{number + 1}"
-    return GpsReport(
-        name, at, at, float(latitude + north), float(longitude), 900.0, None, 0.0, 80.0, 0.0, 5.0, 8.0, 0.5
-    )
+def measured_ms(rounds: int) -> dict[str, tuple[list[float], list[float]]]:
+    """By estimator: CPU of whole rounds, and of the longest part of each."""
+    from bench.crowd import HEARD_S, STARTS, crowd
+    from gateway import predict
+    from gateway.align import SECOND
+    from gateway.fuse.weighting import Model
+    from gateway.settings import Options
 
-
-def measured_ms(state: State, options: Options) -> tuple[float, float]:
-    """CPU of a whole round, and of its longest part, over tracks that are predicted together."""
-    predicting = state.predicting
-    lanes = list(state.lanes.lanes.values())
-    model = Model.of(options, state.site.position, {}, state.site.estimation)
-    parts = [lanes[first : first + TOGETHER] for first in range(0, len(lanes), TOGETHER)]
-    wholes, longest = [], []
-    for turn in range(1, ROUNDS + 1):
-        costs = []
-        for part, some in enumerate(parts):
-            at = STARTS + (3 + turn) * SECOND + part * SECOND // len(parts)
-            began = time.process_time()
-            predicting, made = predict.forecast(
-                predicting, some, at, HORIZONS_S, model, state.site, state.frame, state.geoid.separation_m
-            )
-            table([made], state.frame)
-            costs.append(1e3 * (time.process_time() - began))
-        wholes.append(sum(costs))
-        longest.append(max(costs))
-    return median(wholes[1:]), median(longest[1:])
-
-
-def main() -> None:
-    """Print both estimators' costs."""
-    aircraft = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
-    for estimator in ("kalman", "rmimm"):
-        options = Options(estimator=estimator, horizons_s=HORIZONS_S)
-        whole, part = measured_ms(crowd(aircraft, options), options)
-        costs = f"{whole:.1f} ms CPU a round, {part:.1f} ms at most at once"
-        print(f"{estimator}: {aircraft} aircraft, {len(HORIZONS_S)} horizons: {costs}")
+    found: dict[str, tuple[list[float], list[float]]] = {estimator: ([], []) for estimator in ESTIMATORS}
+    options = {estimator: Options(estimator=estimator, horizons_s=HORIZONS_S) for estimator in ESTIMATORS}
+    states = {estimator: crowd(AIRCRAFT, chosen) for estimator, chosen in options.items()}
+    predicting = {estimator: state.predicting for estimator, state in states.items()}
+    for turn in range(rounds + 1):
+        for estimator, state in states.items():
+            model = Model.of(options[estimator], state.site.position, {}, state.site.estimation)
+            costs = []
+            planned = predicting[estimator].planning(list(state.lanes.lanes), STARTS + (HEARD_S + 1 + turn) * SECOND)
+            while planned.planned:
+                at = planned.due
+                began = time.process_time()
+                planned, tracks = planned.begun(at)
+                lanes = [state.lanes.lanes[track] for track in tracks]
+                planned, made = predict.forecast(
+                    planned, lanes, at, HORIZONS_S, model, state.site, state.frame, state.geoid.separation_m
+                )
+                predict.table([made], state.frame)
+                costs.append(1e3 * (time.process_time() - began))
+            predicting[estimator] = planned
+            if turn:  # the first makes every aircraft's goals, which stay
+                found[estimator][0].append(sum(costs))
+                found[estimator][1].append(max(costs))
+    return found
 
 
 if __name__ == "__main__":
-    main()
+    print(json.dumps(measured_ms(int(sys.argv[1]))))

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 _QUIET_ENVIRONMENT: Mapping[str, str] = {"RERUN_ANALYTICS": "0", "NO_COLOR": "1"}
+_ONE_THREAD: Mapping[str, str] = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +97,16 @@ def run(command: Sequence[str]) -> Cost:
 
 def output(command: Sequence[str]) -> str:
     """What a command prints. Raises ChildFailed when it does not exit with 0."""
-    ended = subprocess.run(command, capture_output=True, text=True, env=environment(), check=False)
+    return _output(command, environment())
+
+
+def alone(command: Sequence[str]) -> str:
+    """The same, in one thread: CPU time of others in the same libraries would count for nothing."""
+    return _output(command, {**environment(), **_ONE_THREAD})
+
+
+def _output(command: Sequence[str], environment: Mapping[str, str]) -> str:
+    ended = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     if ended.returncode != 0:
         raise ChildFailed(f"{' '.join(command)} ended with {ended.returncode}: {ended.stderr[-2000:]}")
     return ended.stdout

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
 import sys
 import time
 from typing import Any
@@ -18,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.measure import ChildFailed, Figure, environment
+from bench.measure import Figure, alone
 
 SOLVED_MS, SHARE_PERCENT = 50.0, 2.0
 PAIRS, AIRCRAFT, SECONDS = 10_000, 1000, 60
@@ -28,12 +27,7 @@ Floats = NDArray[np.float64]
 
 def registration(runs: int) -> list[Figure]:
     """10 000 pairs solved, and the running update's share of a core at 1000 pairs a second."""
-    alone = {**environment(), "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", "bench.registration", str(runs)]
-    ended = subprocess.run(command, capture_output=True, text=True, env=alone, check=False)
-    if ended.returncode != 0:
-        raise ChildFailed(f"{' '.join(command)} ended with {ended.returncode}: {ended.stderr[-2000:]}")
-    told: dict[str, Any] = json.loads(ended.stdout)
+    told: dict[str, Any] = json.loads(alone([sys.executable, "-m", "bench.registration", str(runs)]))
     return [
         Figure("registration: 10 000 pairs solved", "ms", tuple(told["solved_ms"]), SOLVED_MS),
         Figure("registration running, 1000 pairs a second", "% of a core", tuple(told["share"]), SHARE_PERCENT),
