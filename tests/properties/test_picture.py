@@ -112,23 +112,6 @@ SMALL = settings(
 
 
 @SMALL
-@given(_streams(), st.sampled_from(WEIGHTINGS))
-def test_every_rows_covariance_is_symmetric_and_positive(stream: list[Observation], weighting: Weighting) -> None:
-    """Whatever is heard, the covariance of every row is symmetric, positive and finite, and so is its position."""
-    for picture in _run(_heard(stream), weighting):
-        table = picture.fuse
-        assert np.isfinite(table.runway_m).all()
-        assert np.isfinite(table.latitude_rad).all()
-        for row in table.covariance.reshape(-1, 6, 6):
-            size = np.sqrt(row.diagonal())
-            assert (size > 0.0).all()
-            scaled = row / np.outer(size, size)
-            # of correlations: turned from one frame to another by products of numbers below one, a few roundings each
-            assert np.abs(scaled - scaled.T).max() < 1e-12
-            assert np.linalg.eigvalsh(scaled).min() > -1e-9
-
-
-@SMALL
 @given(_streams(), st.sampled_from(WEIGHTINGS), st.lists(st.integers(1, 70), max_size=8))
 def test_any_cut_into_steps_gives_the_same_bits(
     stream: list[Observation], weighting: Weighting, cuts: list[int]
@@ -154,9 +137,31 @@ def test_false_truth_changes_no_bit(
 
 @SMALL
 @given(_streams(), st.sampled_from(WEIGHTINGS))
-def test_track_numbers_and_rows_are_consistent(stream: list[Observation], weighting: Weighting) -> None:
+def test_rows_tracks_and_pairs_are_sound(stream: list[Observation], weighting: Weighting) -> None:
+    """Whatever is heard, arrival by arrival, the three below hold."""
+    heard = _heard(stream)
+    pictures = _run(heard, weighting, range(len(heard)))
+    _check_covariances(pictures)
+    _check_numbers(pictures)
+    _check_pairs(pictures)
+
+
+def _check_covariances(pictures: Sequence[Picture]) -> None:
+    """The covariance of every row is symmetric, positive and finite, and so is its position."""
+    for table in (picture.fuse for picture in pictures):
+        assert np.isfinite(table.runway_m).all()
+        assert np.isfinite(table.latitude_rad).all()
+        for row in table.covariance.reshape(-1, 6, 6):
+            size = np.sqrt(row.diagonal())
+            assert (size > 0.0).all()
+            scaled = row / np.outer(size, size)
+            # of correlations: turned from one frame to another by products of numbers below one, a few roundings each
+            assert np.abs(scaled - scaled.T).max() < 1e-12
+            assert np.linalg.eigvalsh(scaled).min() > -1e-9
+
+
+def _check_numbers(pictures: Sequence[Picture]) -> None:
     """A track has one aircraft or none throughout, numbers count from 1 without gaps, and every track that began ends."""
-    pictures = _run(_heard(stream), weighting)
     who: dict[int, set[str | None]] = {}
     for picture in pictures:
         for track, aircraft in zip(picture.fuse.track.tolist(), picture.fuse.aircraft, strict=True):
@@ -167,12 +172,9 @@ def test_track_numbers_and_rows_are_consistent(stream: list[Observation], weight
     assert set(ended) == set(who)  # the clock ran on for 40 s
 
 
-@SMALL
-@given(_streams(), st.sampled_from(WEIGHTINGS))
-def test_pairs_are_one_to_one(stream: list[Observation], weighting: Weighting) -> None:
+def _check_pairs(pictures: Sequence[Picture]) -> None:
     """At no step is a radar track two aircraft, or an aircraft two tracks of the radar that are both alive."""
-    heard = _heard(stream)
-    for picture in _run(heard, weighting, range(len(heard))):
+    for picture in pictures:
         aircraft, tracks = [pair[0] for pair in picture.associate.pairs], [pair[1] for pair in picture.associate.pairs]
         assert len(set(aircraft)) == len(aircraft)
         assert len(set(tracks)) == len(tracks)

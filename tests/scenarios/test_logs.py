@@ -1,5 +1,8 @@
 """A vehicle's own log beside, and instead of, its telemetry."""
 
+import contextlib
+import io
+import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -9,11 +12,21 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from gateway.cli.app import run
 from gateway.geodesy import geodetic_to_ecef
 
 Talkdown = Callable[..., Any]
 DATA = Path(__file__).parents[1] / "data"
 LOG, TELEMETRY = DATA / "sitl-landing-excerpt.BIN", DATA / "sitl-landing-excerpt.tlog"
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """The summary of a replay of the log, which was archived."""
+    folder = str(tmp_path_factory.mktemp("alone"))
+    with contextlib.redirect_stdout(io.StringIO()) as told:
+        assert run(["replay", str(LOG), "--viewer", "none", "--archive", folder, "--json"]) == 0
+    return json.loads(told.getvalue())
 
 
 def archived(talkdown: Talkdown, folder: Path, *files: Path) -> Any:
@@ -32,10 +45,9 @@ def landing(summary: Any) -> tuple[int, Any]:
 
 
 def test_log_and_telemetry_of_one_flight_land_at_the_same_place_and_together_are_one_aircraft(
-    talkdown: Talkdown, tmp_path: Path
+    talkdown: Talkdown, alone: Any, tmp_path: Path
 ) -> None:
     """The vehicle stands at the end: there the two differ by the centimetre in which they are told."""
-    alone = archived(talkdown, tmp_path, LOG)
     heard = archived(talkdown, tmp_path, TELEMETRY)
     both = archived(talkdown, tmp_path, TELEMETRY, LOG)
     assert alone["site"] == heard["site"] == both["site"]
@@ -47,12 +59,11 @@ def test_log_and_telemetry_of_one_flight_land_at_the_same_place_and_together_are
     assert both["observations"]["GPS reports"] > heard["observations"]["GPS reports"]
 
 
-def test_a_log_that_was_archived_gives_the_same_again(talkdown: Talkdown, tmp_path: Path) -> None:
+def test_a_log_that_was_archived_gives_the_same_again(talkdown: Talkdown, alone: Any, tmp_path: Path) -> None:
     """inputs/ holds the frames that the log was told as; they are replayed without the log."""
-    once = archived(talkdown, tmp_path, LOG)
-    again = archived(talkdown, tmp_path, Path(once["archive"]))
+    again = archived(talkdown, tmp_path, Path(alone["archive"]))
     for name in ("tracks.parquet", "predictions.parquet", "truth.parquet", "inputs/sitl-landing-excerpt.tlog"):
-        assert (Path(once["archive"]) / name).read_bytes() == (Path(again["archive"]) / name).read_bytes()
+        assert (Path(alone["archive"]) / name).read_bytes() == (Path(again["archive"]) / name).read_bytes()
 
 
 def test_a_site_is_proposed_from_a_log(talkdown: Talkdown) -> None:

@@ -256,9 +256,8 @@ def test_the_radars_own_track_is_kept_apart_from_the_position_source() -> None:
     frame = RunwayFrame(scene.site.runway)
     truth = frame.runway_from_geodetic(flown.latitude_rad, flown.longitude_rad, flown.height_m)
     error_m = np.linalg.norm(radars.runway_m - truth, axis=1)
-    assert (
-        error_m.max() < 60.0
-    )  # a plot's own error is 15 m along and 32 m across at 32 km; a dozen of each radar are in it
+    # A plot's own error is 15 m along and 32 m across at 32 km; a dozen of each radar are in it.
+    assert error_m.max() < 60.0
     assert error_m.max() < 4.0 * np.linalg.norm(radars.sigma_m, axis=1).min()
 
 

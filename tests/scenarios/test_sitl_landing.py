@@ -116,6 +116,7 @@ def test_alone_the_recording_gives_the_autopilots_track(talkdown: Talkdown, tmp_
     assert table.error_m[last] <= 10.0
 
 
+@pytest.mark.study
 @pytest.mark.skipif(not WHOLE.exists(), reason="the whole SITL recording does not lie beside the project")
 def test_the_whole_sitl_flight_is_fused_down_to_the_runway(talkdown: Talkdown, tmp_path: Path) -> None:
     """Thirteen minutes with take-off, circuits and landing, joined once and never lost."""
