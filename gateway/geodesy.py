@@ -25,6 +25,12 @@ def prime_vertical_radius_m(latitude_rad: ArrayLike) -> Floats:
     return np.asarray(SEMI_MAJOR_M / np.sqrt(1.0 - ECCENTRICITY_2 * sine * sine))
 
 
+def meridian_radius_m(latitude_rad: ArrayLike) -> Floats:
+    """Radius of curvature along the meridian (M), metres, of the shape of the latitude."""
+    sine = np.sin(np.asarray(latitude_rad, dtype=np.float64))
+    return np.asarray(SEMI_MAJOR_M * (1.0 - ECCENTRICITY_2) / (1.0 - ECCENTRICITY_2 * sine * sine) ** 1.5)
+
+
 def geodetic_to_ecef(latitude_rad: ArrayLike, longitude_rad: ArrayLike, height_m: ArrayLike) -> Floats:
     """Earth-centred, earth-fixed position (..., 3) in metres of geodetic positions (...).
 

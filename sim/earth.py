@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pyproj import Geod
 
-from gateway.geodesy import ECCENTRICITY_2, SEMI_MAJOR_M, prime_vertical_radius_m, wrap_rad
+from gateway.geodesy import meridian_radius_m, prime_vertical_radius_m, wrap_rad
 from gateway.settings import Runway
 from sim.paths import Path
 
@@ -42,12 +42,6 @@ class Flown:
         """The motion mode (...): "straight", "left" or "right" as an observer from above would call it."""
         turning = np.where(self.turn_radps > 0.0, "right", "left")
         return np.where(np.abs(self.turn_radps) < TURNING_RADPS, "straight", turning)
-
-
-def meridian_radius_m(latitude_rad: ArrayLike) -> Floats:
-    """Radius of curvature along the meridian (M), metres, of the shape of the latitude."""
-    sine = np.sin(np.asarray(latitude_rad, dtype=np.float64))
-    return np.asarray(SEMI_MAJOR_M * (1.0 - ECCENTRICITY_2) / (1.0 - ECCENTRICITY_2 * sine * sine) ** 1.5)
 
 
 def fly(path: Path, runway: Runway, time_s: ArrayLike) -> Flown:

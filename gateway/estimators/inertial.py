@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gateway.geodesy import ECCENTRICITY_2, FLATTENING, SEMI_MAJOR_M
+from gateway.geodesy import ECCENTRICITY_2, FLATTENING, SEMI_MAJOR_M, meridian_radius_m, prime_vertical_radius_m
 
 Floats = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ def advanced(
 
 def displaced(latitude: Floats, longitude: Floats, height: Floats, metres: Floats) -> tuple[Floats, Floats, Floats]:
     """A geodetic place moved by metres north, east, down (..., 3)."""
-    meridian, normal = radii(latitude)
+    meridian, normal = meridian_radius_m(latitude), prime_vertical_radius_m(latitude)
     further = latitude + metres[..., 0] / (meridian + height)
     middle = 0.5 * (latitude + further)
     return further, longitude + metres[..., 1] / ((normal + height) * np.cos(middle)), height - metres[..., 2]
@@ -69,18 +69,11 @@ def displaced(latitude: Floats, longitude: Floats, height: Floats, metres: Float
 
 def between(latitude: Floats, longitude: Floats, height: Floats, motion: Motion) -> Floats:
     """Metres north, east, down (..., 3) from a motion's place to a geodetic one near to it."""
-    meridian, normal = radii(motion.latitude_rad)
+    meridian, normal = meridian_radius_m(motion.latitude_rad), prime_vertical_radius_m(motion.latitude_rad)
     middle = 0.5 * (latitude + motion.latitude_rad)
     north = (latitude - motion.latitude_rad) * (meridian + motion.height_m)
     east = (longitude - motion.longitude_rad) * (normal + motion.height_m) * np.cos(middle)
     return np.stack(np.broadcast_arrays(north, east, motion.height_m - height), axis=-1)
-
-
-def radii(latitude_rad: ArrayLike) -> tuple[Floats, Floats]:
-    """Radii of curvature in the meridian and in the prime vertical, m."""
-    sine = np.sin(np.asarray(latitude_rad, dtype=np.float64))
-    root = 1.0 - ECCENTRICITY_2 * sine * sine
-    return SEMI_MAJOR_M * (1.0 - ECCENTRICITY_2) / root**1.5, SEMI_MAJOR_M / np.sqrt(root)
 
 
 def earth_rate(latitude_rad: ArrayLike) -> Floats:
@@ -93,7 +86,7 @@ def earth_rate(latitude_rad: ArrayLike) -> Floats:
 
 def transport(motion: Motion) -> Floats:
     """How north and down turn because the vehicle moves over the curved earth (..., 3) rad/s."""
-    meridian, normal = radii(motion.latitude_rad)
+    meridian, normal = meridian_radius_m(motion.latitude_rad), prime_vertical_radius_m(motion.latitude_rad)
     north, east = motion.velocity_mps[..., 0], motion.velocity_mps[..., 1]
     about_north = east / (normal + motion.height_m)
     made = np.empty((*np.shape(motion.latitude_rad), 3))

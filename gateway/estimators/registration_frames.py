@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.geodesy import (
-    ECCENTRICITY_2,
-    SEMI_MAJOR_M,
     ecef_to_geodetic,
     geodetic_to_ecef,
+    meridian_radius_m,
     prime_vertical_radius_m,
     wrap_rad,
 )
@@ -84,10 +83,8 @@ def per_metre(geodetic: Floats, *, each: bool = False) -> Floats:
     """
     place = geodetic if each else geodetic.mean(axis=-2)
     latitude, height = place[..., 1], place[..., 2]
-    normal = prime_vertical_radius_m(latitude)
-    meridian = normal**3 * (1.0 - ECCENTRICITY_2) / SEMI_MAJOR_M**2
-    east = 1.0 / np.maximum((normal + height) * np.cos(latitude), 1.0)
-    return np.stack([east, 1.0 / (meridian + height), np.ones_like(east)], axis=-1)
+    east = 1.0 / np.maximum((prime_vertical_radius_m(latitude) + height) * np.cos(latitude), 1.0)
+    return np.stack([east, 1.0 / (meridian_radius_m(latitude) + height), np.ones_like(east)], axis=-1)
 
 
 def _local(polar: Floats) -> tuple[Floats, Floats]:

@@ -33,7 +33,7 @@ from adapters.published import (
     made_up_address,
 )
 from gateway.fuse import Fused
-from gateway.geodesy import ECCENTRICITY_2, SEMI_MAJOR_M, prime_vertical_radius_m
+from gateway.geodesy import meridian_radius_m, prime_vertical_radius_m
 from gateway.observation import Observation, RadarPlot
 from gateway.picture import Picture
 
@@ -197,6 +197,6 @@ def _known(value: float) -> float | None:
 def _moved(latitude: float, longitude: float, east_mps: float, north_mps: float, time_s: float) -> tuple[float, float]:
     """A position, moved on for less than a second. The height would change it by a millimetre, and is left out."""
     normal_m = float(prime_vertical_radius_m(latitude))
-    meridian_m = normal_m**3 * (1.0 - ECCENTRICITY_2) / SEMI_MAJOR_M**2
+    meridian_m = float(meridian_radius_m(latitude))
     moved = latitude + north_mps * time_s / meridian_m
     return moved, longitude + east_mps * time_s / (normal_m * max(math.cos(latitude), 1e-9))
