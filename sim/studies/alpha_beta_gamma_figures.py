@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gateway.estimators.alpha_beta_gamma import Tuning
 from gateway.estimators.steady_gains import gains
 from sim.studies.alpha_beta_gamma import ENOUGH, TOO_SMALL, Run, manoeuvre, noise_free, sine
+from sim.studies.figures import line, plot
 
 Floats = NDArray[np.float64]
 
@@ -58,27 +59,9 @@ def draw(path: Path, seed: int) -> None:
 def _blueprint() -> rrb.Blueprint:
     tabs = []
     for figure, title, plots, span_s in FIGURES:
-        views = [_plot(f"/{figure}/{name}", heading, span_s) for name, heading in plots]
+        views = [plot(f"/{figure}/{name}", heading, span_s) for name, heading in plots]
         tabs.append(rrb.Vertical(*views, name=title))
     return rrb.Blueprint(rrb.Tabs(*tabs), rrb.TimePanel(timeline="time", state="collapsed"), collapse_panels=True)
-
-
-def _plot(origin: str, name: str, span_s: float) -> rrb.TimeSeriesView:
-    ends = (rrb.TimeRangeBoundary.cursor_relative(seconds=span) for span in (-span_s, span_s))
-    return rrb.TimeSeriesView(origin=origin, name=name, axis_x=rrb.TimeAxis(view_range=rrb.TimeRange(*ends)))
-
-
-def _line(
-    recording: rr.RecordingStream,
-    path: str,
-    time_s: Floats,
-    values: Floats,
-    color: list[int],
-    name: str,
-    width: float = 1.2,
-) -> None:
-    recording.log(path, rr.SeriesLines(colors=[color], names=[name], widths=[width]), static=True)
-    recording.send_columns(path, [rr.TimeColumn("time", duration=time_s)], rr.Scalars.columns(scalars=values))
 
 
 def _dots(
@@ -91,21 +74,21 @@ def _dots(
 def _draw_motion(recording: rr.RecordingStream, figure: str, run: Run) -> None:
     """Figures 3 and 4: estimate on truth, and the squared error."""
     for place, (name, _) in enumerate(MOTION[:3]):
-        _line(recording, f"/{figure}/{name}/filtered", run.time_s, run.estimate[:, 0, place], FILTERED, "filtered", 4.0)
-        _line(recording, f"/{figure}/{name}/true", run.time_s, run.truth[:, place], TRUE, "true")
-    _line(recording, f"/{figure}/error/squared", run.time_s, np.square(run.error_m[:, 0]), FILTERED, "squared error")
+        line(recording, f"/{figure}/{name}/filtered", run.time_s, run.estimate[:, 0, place], FILTERED, "filtered", 4.0)
+        line(recording, f"/{figure}/{name}/true", run.time_s, run.truth[:, place], TRUE, "true")
+    line(recording, f"/{figure}/error/squared", run.time_s, np.square(run.error_m[:, 0]), FILTERED, "squared error")
 
 
 def _draw_sine(recording: rr.RecordingStream, run: Run) -> None:
     """Figure 5: the filtered track beside what was measured, and on the truth."""
     filtered = run.estimate[:, 0, 0]
     _dots(recording, "/figure_5/measured/measured", run.time_s, run.measured_m[:, 0], MEASURED, "measured")
-    _line(recording, "/figure_5/measured/filtered", run.time_s, filtered, FILTERED, "filtered")
-    _line(recording, "/figure_5/true/filtered", run.time_s, filtered, FILTERED, "filtered", 4.0)
-    _line(recording, "/figure_5/true/true", run.time_s, run.truth[:, 0], TRUE, "true")
+    line(recording, "/figure_5/measured/filtered", run.time_s, filtered, FILTERED, "filtered")
+    line(recording, "/figure_5/true/filtered", run.time_s, filtered, FILTERED, "filtered", 4.0)
+    line(recording, "/figure_5/true/true", run.time_s, run.truth[:, 0], TRUE, "true")
     _dots(recording, "/figure_5/error/measured", run.time_s, _noise(run), MEASURED, "measured")
-    _line(recording, "/figure_5/error/filtered", run.time_s, run.error_m[:, 0], FILTERED, "filtered")
-    _line(recording, "/figure_5/p/p", run.time_s, run.p[:, 0], FILTERED, "p")
+    line(recording, "/figure_5/error/filtered", run.time_s, run.error_m[:, 0], FILTERED, "filtered")
+    line(recording, "/figure_5/p/p", run.time_s, run.p[:, 0], FILTERED, "p")
     _draw_gains(recording, "figure_5", run)
 
 
@@ -120,17 +103,17 @@ def _draw_manoeuvre(recording: rr.RecordingStream, seed: int) -> None:
     )
     _dots(recording, "/manoeuvre/small/measured", adaptive.time_s, _noise(adaptive), MEASURED, "measured")
     for key, name, run, color in shown:
-        _line(recording, f"/manoeuvre/error/{key}", run.time_s, run.error_m[:, 0], color, name)
-        _line(recording, f"/manoeuvre/p/{key}", run.time_s, run.p[:, 0], color, name)
+        line(recording, f"/manoeuvre/error/{key}", run.time_s, run.error_m[:, 0], color, name)
+        line(recording, f"/manoeuvre/p/{key}", run.time_s, run.p[:, 0], color, name)
         if key != "fixed":
-            _line(recording, f"/manoeuvre/small/{key}", run.time_s, run.error_m[:, 0], color, name)
+            line(recording, f"/manoeuvre/small/{key}", run.time_s, run.error_m[:, 0], color, name)
     _draw_gains(recording, "manoeuvre", adaptive)
 
 
 def _draw_gains(recording: rr.RecordingStream, figure: str, run: Run) -> None:
     alpha, beta, half_gamma = gains(run.gamma[:, 0], np.ones(len(run.time_s)))
     for name, values, color in (("alpha", alpha, FILTERED), ("beta", beta, OTHER), ("gamma", 2.0 * half_gamma, GREEN)):
-        _line(recording, f"/{figure}/gains/{name}", run.time_s, values, color, name)
+        line(recording, f"/{figure}/gains/{name}", run.time_s, values, color, name)
 
 
 def _noise(run: Run) -> Floats:

@@ -11,6 +11,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from sim.studies.figures import path_of
+
 if TYPE_CHECKING:
     from sim.studies.clutter import Followed
 
@@ -28,9 +30,9 @@ def draw(path: Path, found: Mapping[str, Sequence[Followed]], true_m: Floats) ->
         _flight(recording, "true", TRUE, [one.T for one in true_m])
         for (name, runs), color in zip(found.items(), COLORS, strict=True):
             held = np.mean([[seen.tracks for seen in one.seen] for one in runs], axis=0)
-            _line(recording, f"/gospa/{_path(name)}", np.mean([one.gospa_m for one in runs], axis=0), color, name)
-            _line(recording, f"/tracks/{_path(name)}", held, color, name)
-            _line(recording, f"/false/{_path(name)}", np.mean([one.false for one in runs], axis=0), color, name)
+            _line(recording, f"/gospa/{path_of(name)}", np.mean([one.gospa_m for one in runs], axis=0), color, name)
+            _line(recording, f"/tracks/{path_of(name)}", held, color, name)
+            _line(recording, f"/false/{path_of(name)}", np.mean([one.false for one in runs], axis=0), color, name)
             _likelihoods(recording, name, runs[0])
             told: dict[int, list[Floats]] = {}
             for seen in runs[0].seen:
@@ -51,10 +53,6 @@ def _blueprint() -> rrb.Blueprint:
     return rrb.Blueprint(tabs, rrb.TimePanel(timeline="scan", state="collapsed"), collapse_panels=True)
 
 
-def _path(name: str) -> str:
-    return name.replace(" ", "_")
-
-
 def _line(recording: rr.RecordingStream, path: str, values: Floats, color: list[int], name: str) -> None:
     recording.log(path, rr.SeriesLines(colors=[color], names=[name]), static=True)
     scans = rr.TimeColumn("scan", sequence=np.arange(len(values)))
@@ -68,7 +66,7 @@ def _likelihoods(recording: rr.RecordingStream, name: str, one: Followed) -> Non
         for number, likelihood in zip(seen.number.tolist(), seen.likelihood.tolist(), strict=True):
             by_number.setdefault(number, []).append((scan, likelihood))
     for number, points in by_number.items():
-        path = f"/likelihood/{_path(name)}/{number}"
+        path = f"/likelihood/{path_of(name)}/{number}"
         recording.log(path, rr.SeriesLines(names=[f"{name}, {number}"]), static=True)
         scans = rr.TimeColumn("scan", sequence=[scan for scan, _ in points])
         recording.send_columns(path, [scans], rr.Scalars.columns(scalars=[value for _, value in points]))
@@ -77,4 +75,4 @@ def _likelihoods(recording: rr.RecordingStream, name: str, one: Followed) -> Non
 def _flight(recording: rr.RecordingStream, name: str, color: list[int], lines: Sequence[Floats]) -> None:
     """North is up, so the second axis is turned: a picture's points downwards. A negative radius is on the screen."""
     strips = rr.LineStrips2D([line * [1.0, -1.0] for line in lines if len(line) > 1], colors=[color], radii=-0.75)
-    recording.log(f"/flight/{_path(name)}", strips, static=True)
+    recording.log(f"/flight/{path_of(name)}", strips, static=True)

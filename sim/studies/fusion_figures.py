@@ -26,6 +26,7 @@ from gateway.settings import Options
 from sim.cases import Case, case_003
 from sim.sensors import RadarParameters
 from sim.studies import fusion
+from sim.studies.figures import plot
 
 Floats = NDArray[np.float64]
 
@@ -48,21 +49,16 @@ def draw(path: Path, seed: int) -> None:
 
 
 def _blueprint() -> rrb.Blueprint:
-    four = [_plot(f"/figure_4/{name}", f"radar less GPS, {name} ({unit})", FOUR_S) for name, unit, _ in COMPONENTS]
-    counter = _plot("/figure_4/counter", "counter, associated at 3", FOUR_S)
+    four = [plot(f"/figure_4/{name}", f"radar less GPS, {name} ({unit})", FOUR_S) for name, unit, _ in COMPONENTS]
+    counter = plot("/figure_4/counter", "counter, associated at 3", FOUR_S)
     axes = ("along", "left", "up")
-    five = [_plot(f"/figure_5/{axis}", f"deviation from the truth, {axis} (m)", FIVE_S) for axis in axes]
+    five = [plot(f"/figure_5/{axis}", f"deviation from the truth, {axis} (m)", FIVE_S) for axis in axes]
     tabs = rrb.Tabs(
         rrb.Vertical(*four, counter, name="Figure 4: association"),
         rrb.Vertical(*five, name="Figure 5: after association"),
         rrb.Spatial3DView(origin="/figure_6", name="Figure 6: the approach"),
     )
     return rrb.Blueprint(tabs, rrb.TimePanel(timeline="time", state="collapsed"), collapse_panels=True)
-
-
-def _plot(origin: str, name: str, span_s: float) -> rrb.TimeSeriesView:
-    ends = (rrb.TimeRangeBoundary.cursor_relative(seconds=span) for span in (-span_s, span_s))
-    return rrb.TimeSeriesView(origin=origin, name=name, axis_x=rrb.TimeAxis(view_range=rrb.TimeRange(*ends)))
 
 
 def _series(

@@ -13,6 +13,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from sim.studies.figures import line, path_of, plot
 from sim.studies.intents import FIRST_S, Followed, Method, Points, predicted
 from sim.studies.rmimm import END_S, Flight
 
@@ -54,39 +55,28 @@ def _blueprint() -> rrb.Blueprint:
     tabs = rrb.Tabs(
         rrb.Spatial2DView(origin="/figure-4", name="4: the flight, and where it was foretold 10 s before"),
         rrb.Vertical(
-            _plot("/figure-5", "5: position foretold 10 s before, with intent: RMS by axis, m"),
-            _plot("/figure-7", "7: the same by the filter alone"),
+            plot("/figure-5", "5: position foretold 10 s before, with intent: RMS by axis, m", END_S),
+            plot("/figure-7", "7: the same by the filter alone", END_S),
             name="5, 7: position",
         ),
         rrb.Vertical(
-            _plot("/figure-6", "6: velocity foretold 10 s before, with intent: RMS by axis, m/s"),
-            _plot("/figure-8", "8: the same by the filter alone"),
+            plot("/figure-6", "6: velocity foretold 10 s before, with intent: RMS by axis, m/s", END_S),
+            plot("/figure-8", "8: the same by the filter alone", END_S),
             name="6, 8: velocity",
         ),
         rrb.Vertical(
-            _plot("/figure-9", "9: modes' probabilities, the filter alone"),
-            _plot("/figure-10", "10: with the inferred intent fed back"),
-            _plot("/figure-10-known-point", "10: with the point known"),
+            plot("/figure-9", "9: modes' probabilities, the filter alone", END_S),
+            plot("/figure-10", "10: with the inferred intent fed back", END_S),
+            plot("/figure-10-known-point", "10: with the point known", END_S),
             name="9, 10: modes",
         ),
     )
     return rrb.Blueprint(tabs, rrb.TimePanel(timeline="time", state="collapsed"), collapse_panels=True)
 
 
-def _plot(origin: str, name: str) -> rrb.TimeSeriesView:
-    ends = (rrb.TimeRangeBoundary.cursor_relative(seconds=span) for span in (-float(END_S), float(END_S)))
-    return rrb.TimeSeriesView(origin=origin, name=name, axis_x=rrb.TimeAxis(view_range=rrb.TimeRange(*ends)))
-
-
-def _path(name: str) -> str:
-    return name.lower().replace(",", "").replace(" ", "-")
-
-
 def _line(recording: rr.RecordingStream, path: str, first_s: int, values: Floats, color: list[int], name: str) -> None:
     """Values at first_s, first_s + 1, ... s."""
-    recording.log(path, rr.SeriesLines(colors=[color], names=[name]), static=True)
-    time = rr.TimeColumn("time", duration=np.arange(float(first_s), first_s + len(values)))
-    recording.send_columns(path, [time], rr.Scalars.columns(scalars=values))
+    line(recording, path, np.arange(float(first_s), first_s + len(values)), values, color, name)
 
 
 def _draw_errors(
@@ -110,7 +100,7 @@ def _draw_errors(
     for figure, off in zip(figures, (off_m, off_mps), strict=True):
         for axis, rms in zip("xy", np.sqrt(np.array(off)).T, strict=True):
             shade = color if axis == "x" else [value * 2 // 3 for value in color]
-            _line(recording, f"/{figure}/{_path(name)}/{axis}", FIRST_S + AHEAD_S + 1, rms, shade, f"{name}, {axis}")
+            _line(recording, f"/{figure}/{path_of(name)}/{axis}", FIRST_S + AHEAD_S + 1, rms, shade, f"{name}, {axis}")
 
 
 def _draw_flight(recording: rr.RecordingStream, flown: Flight, points: Points, found: Mapping[str, Followed]) -> None:
@@ -130,4 +120,4 @@ def _draw_flight(recording: rr.RecordingStream, flown: Flight, points: Points, f
             for step in range(FIRST_S, END_S - AHEAD_S)
         ]
         dots = rr.Points2D(np.array(ahead) * up, colors=[color], radii=-1.25)
-        recording.log(f"/figure-4/foretold/{_path(name)}", dots, static=True)
+        recording.log(f"/figure-4/foretold/{path_of(name)}", dots, static=True)

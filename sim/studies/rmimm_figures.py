@@ -9,6 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from sim.studies.figures import line, path_of, plot
 from sim.studies.rmimm import END_S, LEGS, VARIANTS, Flight, Tracks, delays_s, filtered, flight
 
 Floats = NDArray[np.float64]
@@ -36,12 +37,15 @@ def draw(path: Path, runs: int, seed: int) -> None:
 
 
 def _blueprint() -> rrb.Blueprint:
-    errors = [_plot("/errors/position", "position, RMS m"), _plot("/errors/velocity", "velocity, RMS m/s")]
-    errors.append(_plot("/errors/nees", "NEES, mean; 4 = honest"))
-    modes = [_plot(f"/modes/{_path(name)}", f"{name}: probabilities, mean") for name, _, _ in VARIANTS[:3]]
+    errors = [
+        plot("/errors/position", "position, RMS m", END_S),
+        plot("/errors/velocity", "velocity, RMS m/s", END_S),
+    ]
+    errors.append(plot("/errors/nees", "NEES, mean; 4 = honest", END_S))
+    modes = [plot(f"/modes/{path_of(name)}", f"{name}: probabilities, mean", END_S) for name, _, _ in VARIANTS[:3]]
     delays = [
         rrb.Vertical(
-            *(rrb.BarChartView(origin=f"/delays/{since}/{_path(name)}", name=name) for name, _, _ in VARIANTS),
+            *(rrb.BarChartView(origin=f"/delays/{since}/{path_of(name)}", name=name) for name, _, _ in VARIANTS),
             name=f"change at {since} s",
         )
         for since, _ in LEGS[1:]
@@ -55,33 +59,22 @@ def _blueprint() -> rrb.Blueprint:
     return rrb.Blueprint(tabs, rrb.TimePanel(timeline="time", state="collapsed"), collapse_panels=True)
 
 
-def _plot(origin: str, name: str) -> rrb.TimeSeriesView:
-    ends = (rrb.TimeRangeBoundary.cursor_relative(seconds=span) for span in (-float(END_S), float(END_S)))
-    return rrb.TimeSeriesView(origin=origin, name=name, axis_x=rrb.TimeAxis(view_range=rrb.TimeRange(*ends)))
-
-
-def _path(name: str) -> str:
-    return name.lower().replace(",", "").replace(" ", "_")
-
-
 def _line(recording: rr.RecordingStream, path: str, values: Floats, color: list[int], name: str) -> None:
     """Values at t = 1, 2, ... s."""
-    recording.log(path, rr.SeriesLines(colors=[color], names=[name]), static=True)
-    time = rr.TimeColumn("time", duration=np.arange(1.0, len(values) + 1.0))
-    recording.send_columns(path, [time], rr.Scalars.columns(scalars=values))
+    line(recording, path, np.arange(1.0, len(values) + 1.0), values, color, name)
 
 
 def _draw_errors(recording: rr.RecordingStream, name: str, color: list[int], flown: Flight, tracks: Tracks) -> None:
     for what, place, true in (("position", slice(0, 2), flown.position), ("velocity", slice(3, 5), flown.velocity)):
         off = tracks.mean[:, :, place] - true[:, None]
         rms = np.sqrt((off**2).sum(axis=2).mean(axis=1))
-        _line(recording, f"/errors/{what}/{_path(name)}", rms, color, name)
-    _line(recording, f"/errors/nees/{_path(name)}", tracks.nees.mean(axis=1), color, name)
+        _line(recording, f"/errors/{what}/{path_of(name)}", rms, color, name)
+    _line(recording, f"/errors/nees/{path_of(name)}", tracks.nees.mean(axis=1), color, name)
 
 
 def _draw_modes(recording: rr.RecordingStream, name: str, tracks: Tracks) -> None:
     for place, (mode, color) in enumerate(MODES):
-        _line(recording, f"/modes/{_path(name)}/{mode}", tracks.probability[:, :, place].mean(axis=1), color, mode)
+        _line(recording, f"/modes/{path_of(name)}/{mode}", tracks.probability[:, :, place].mean(axis=1), color, mode)
 
 
 def _draw_delays(recording: rr.RecordingStream, name: str, color: list[int], tracks: Tracks) -> None:
@@ -89,7 +82,7 @@ def _draw_delays(recording: rr.RecordingStream, name: str, color: list[int], tra
     for since, mode in LEGS[1:]:
         late = np.minimum(delays_s(tracks, since, mode), LATEST_S).astype(np.int64)
         counts = np.bincount(late, minlength=LATEST_S + 1)
-        recording.log(f"/delays/{since}/{_path(name)}", rr.BarChart(counts, color=color), static=True)
+        recording.log(f"/delays/{since}/{path_of(name)}", rr.BarChart(counts, color=color), static=True)
 
 
 def _draw_measured(recording: rr.RecordingStream, flown: Flight) -> None:
@@ -101,4 +94,4 @@ def _draw_measured(recording: rr.RecordingStream, flown: Flight) -> None:
 def _flight(recording: rr.RecordingStream, name: str, color: list[int], position: Floats) -> None:
     """North is up, so the second axis is turned: a picture's points downwards. A negative radius is on the screen."""
     strip = rr.LineStrips2D([position * [1.0, -1.0]], colors=[color], radii=-0.75)
-    recording.log(f"/flight/{_path(name)}", strip, static=True)
+    recording.log(f"/flight/{path_of(name)}", strip, static=True)

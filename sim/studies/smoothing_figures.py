@@ -12,6 +12,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from sim.cases import Case
+from sim.studies.figures import line, plot
 from sim.studies.fusion import COUNTED_FROM_S
 
 if TYPE_CHECKING:
@@ -52,20 +53,14 @@ def _blueprint() -> rrb.Blueprint:
         ("/nees", "NEES; 3 = honest"),
     )
     return rrb.Blueprint(
-        rrb.Vertical(*(_plot(origin, name) for origin, name in views)),
+        rrb.Vertical(*(plot(origin, name, SPAN_S) for origin, name in views)),
         rrb.TimePanel(timeline="time", state="collapsed"),
         collapse_panels=True,
     )
-
-
-def _plot(origin: str, name: str) -> rrb.TimeSeriesView:
-    ends = (rrb.TimeRangeBoundary.cursor_relative(seconds=span) for span in (-SPAN_S, SPAN_S))
-    return rrb.TimeSeriesView(origin=origin, name=name, axis_x=rrb.TimeAxis(view_range=rrb.TimeRange(*ends)))
 
 
 def _line(recording: rr.RecordingStream, path: str, time_s: Floats, values: Floats, name: str) -> None:
     """Values at times; the filtered lines are paler."""
     colour = np.array(COLOURS[name.partition(",")[0]])
     shown = colour if name.endswith("smoothed") else PALER * colour
-    recording.log(path, rr.SeriesLines(colors=[shown.astype(int).tolist()], names=[name]), static=True)
-    recording.send_columns(path, [rr.TimeColumn("time", duration=time_s)], rr.Scalars.columns(scalars=values))
+    line(recording, path, time_s, values, shown.astype(int).tolist(), name)
