@@ -222,7 +222,7 @@ def test_rates_are_of_the_last_seconds() -> None:
     st.integers(0, WRAP_MS - 1),
     st.integers(0, 3_000),
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_unwrapped_time_grows_as_the_source_counts_in_order(steps: list[int], first: int, delay_ms: int) -> None:
     clock, boot_ms, told = SourceClock(), first, []
     for step in steps:
@@ -246,7 +246,7 @@ _FRAMES = st.tuples(
 
 
 @given(st.lists(_FRAMES, max_size=120))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_no_sequence_of_times_raises_and_the_sessions_time_is_always_a_time(
     frames: list[tuple[int, int, int | None]],
 ) -> None:
@@ -269,7 +269,6 @@ def test_no_sequence_of_times_raises_and_the_sessions_time_is_always_a_time(
 
 
 @given(st.lists(st.tuples(st.integers(0, 100 * SECOND), st.integers(0, 100 * SECOND)), max_size=60))
-@settings(deadline=None)
 def test_no_pair_of_clocks_stops_the_measuring_of_their_speed(pairs: list[tuple[int, int]]) -> None:
     meter = SpeedMeter()
     for ours, theirs in pairs:

@@ -94,7 +94,7 @@ PIECES = st.lists(
 DAMAGE = st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), max_size=6)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(PIECES, DAMAGE, st.integers(1, 2000))
 def test_damaged_files_are_read_by_the_rules(pieces: list[bytes], damage: list[tuple[float, int]], cut: int) -> None:
     """Both readers, however the file comes in pieces, find what a plain reading finds, and count what it counts."""

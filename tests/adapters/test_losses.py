@@ -96,7 +96,7 @@ def test_frames_of_nobody_and_no_frames_are_counted_as_such() -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 255), st.sampled_from((1, 154)), st.booleans()), max_size=80))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_frames_that_are_only_counted_are_counted_as_all_others(sent: list[tuple[int, int, bool]]) -> None:
     """MAVLink 1 frames of the same numbers take the long way, and come to the same counters."""
     short, long = [], []

@@ -40,7 +40,7 @@ FATES = st.lists(
 )  # what happens, how late, how many are lost
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.integers(0, 255), FATES)
 def test_losses_duplicates_and_late_frames_are_counted_as_they_are(
     first: int, fates: list[tuple[int, int, int]]
@@ -112,7 +112,7 @@ def test_components_that_share_a_counter_lose_nothing_by_it() -> None:
     assert sum(counters["lost"] for counters in _two(holes)) == 3
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.integers(0, 255), st.integers(0, 255), st.lists(st.booleans(), min_size=50, max_size=800))
 def test_components_with_counters_of_their_own_are_never_taken_together(
     first: int, second: int, turns: list[bool]

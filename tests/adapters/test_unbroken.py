@@ -180,7 +180,7 @@ def _state(check: SequenceCheck) -> tuple[object, ...]:
 @example(1, {}, {"reboots": 300}, 350, 1)
 @example(2, {}, {"over two links": 200, "is none": 400}, 700, 1)
 @example(3, {}, {"other autopilot": 150, "sets another date": 400}, 700, 1)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_many_at_once_are_heard_and_counted_as_one_by_one(
     seed: int, faults: dict[str, int], changes: dict[str, int], many: int, few: int
 ) -> None:
@@ -207,7 +207,6 @@ def _compare_with_one_by_one(arrivals: list[Arrival], many: int, *, leaps: bool)
 @given(
     st.integers(0, 255), st.lists(st.integers(1, 400), min_size=1, max_size=4), st.lists(st.integers(1, 90), max_size=3)
 )
-@settings(deadline=None)
 def test_numbers_that_run_on_leave_the_check_as_if_each_were_heard(
     first: int, runs: list[int], gaps: list[int]
 ) -> None:

@@ -59,7 +59,7 @@ def _steps(n: int, count: int, rng: np.random.Generator) -> list[tuple[Floats, .
     return steps
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), tuning=st.sampled_from(TUNINGS))
 def test_a_batch_equals_one_by_one_to_the_bit(seed: int, tuning: Tuning) -> None:
     """Nothing of a track depends on how many come along."""
@@ -81,7 +81,7 @@ def test_a_batch_equals_one_by_one_to_the_bit(seed: int, tuning: Tuning) -> None
             np.testing.assert_array_equal(getattr(one, f.name), expected)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 2**32 - 1), tuning=st.sampled_from(TUNINGS[:3]))  # a fixed q is for equal intervals
 def test_covariances_stay_symmetric_and_positive(seed: int, tuning: Tuning) -> None:
     """Whatever is missing, however long or short the intervals and good or bad the measurements."""
@@ -96,7 +96,7 @@ def test_covariances_stay_symmetric_and_positive(seed: int, tuning: Tuning) -> N
         assert np.linalg.eigvalsh(matrices / scale[..., :, None] / scale[..., None, :]).min() > -1e-9
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), tuning=st.sampled_from(TUNINGS))
 def test_what_is_not_measured_changes_nothing(seed: int, tuning: Tuning) -> None:
     """A NaN axis is only predicted, adds nothing to the innovation, and leaves the other axes' bits alone."""

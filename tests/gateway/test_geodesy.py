@@ -47,7 +47,7 @@ def test_ecef_to_geodetic_inverts_pyproj_everywhere(places: tuple[np.ndarray, np
     assert np.abs(turned[off_pole]).max() < 1e-9
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     st.floats(-90.0, 90.0),
     st.floats(-180.0, 180.0),

@@ -197,7 +197,7 @@ def test_a_source_that_really_jumped_is_followed() -> None:
     assert state.mean[0, :3] == pytest.approx([1000.0, 0.0, 0.0], abs=30.0)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     st.lists(
         st.tuples(st.floats(0.0, 30.0), st.floats(-1e5, 1e5) | st.just(math.nan), st.floats(1e-4, 1e4)),

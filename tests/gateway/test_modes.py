@@ -208,7 +208,7 @@ def test_one_track_has_the_bits_that_it_has_among_many(rule: Rule) -> None:
             assert combine(alone[i]).covariance[0].tobytes() == state.covariance[i].tobytes()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     st.lists(
         st.tuples(st.floats(0.0, 30.0), st.floats(-1e5, 1e5) | st.just(math.nan), st.floats(1e-2, 1e4)),

@@ -65,7 +65,7 @@ def test_no_payload_of_a_message_raises_or_gives_a_number_that_is_none(message: 
     assert mistakes == []
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(st.sampled_from(WANTED), st.binary(max_size=60), st.integers(0, 10**10)), max_size=40))
 def test_no_succession_of_messages_raises(told: list[tuple[int, bytes, int]]) -> None:
     observer = MavlinkObserver(SessionEpoch(), {0: "a link"})

@@ -50,7 +50,7 @@ TLOG = (TESTS / "data" / "sitl-landing-excerpt.tlog").read_bytes()[:12_000]
 BIN = (TESTS / "data" / "sitl-landing-excerpt.BIN").read_bytes()[:30_000]
 FRAMES = [frame for _, frame in TlogReader(io.BytesIO(TLOG))]
 WANTED = sorted(MavlinkObserver(SessionEpoch()).wanted)
-QUICK = settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+QUICK = settings(max_examples=40, suppress_health_check=list(HealthCheck))
 
 
 def _plots(number: int) -> bytes:

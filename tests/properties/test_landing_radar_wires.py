@@ -56,7 +56,7 @@ def _status(draw: st.DrawFn) -> tuple[Header, list[Record]]:
 KEYS = st.none() | st.binary(min_size=1, max_size=64)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(_plots() | _status(), KEYS)
 def test_every_datagram_that_can_be_written_reads_the_same(
     written: tuple[Header, list[Record]], key: bytes | None
@@ -71,7 +71,7 @@ def test_every_datagram_that_can_be_written_reads_the_same(
     )  # fmt: skip
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(_plots() | _status(), KEYS, st.data())
 def test_any_cut_or_flipped_byte_is_refused_and_never_raises(
     written: tuple[Header, list[Record]], key: bytes | None, data: st.DataObject
@@ -89,7 +89,7 @@ def test_any_cut_or_flipped_byte_is_refused_and_never_raises(
 SENT = st.tuples(st.integers(0, 2**32 - 1) | st.integers(0, 3000), TIMES | st.integers(4 * 10**12, 5 * 10**12))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.lists(SENT, max_size=30), st.data())
 def test_with_a_key_nothing_is_ever_taken_twice_whatever_is_sent_again(
     sent: list[tuple[int, int]], data: st.DataObject
@@ -101,7 +101,7 @@ def test_with_a_key_nothing_is_ever_taken_twice_whatever_is_sent_again(
     assert len(taken) == len(set(taken))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.lists(SENT, max_size=30))
 def test_losses_are_never_more_than_the_radar_could_have_sent(sent: list[tuple[int, int]]) -> None:
     """1024 at once, else 1000 a second: never 2^32 for one that is late."""
@@ -113,7 +113,7 @@ def test_losses_are_never_more_than_the_radar_could_have_sent(sent: list[tuple[i
         assert receiver.counters["lost"] - before <= max(1024, 1000 * span_s)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.binary(max_size=200), KEYS)
 def test_no_bytes_raise(data: bytes, key: bytes | None) -> None:
     assert decode(b"LR\x01" + data, key) in REASONS or len(data) >= 25

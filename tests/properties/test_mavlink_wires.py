@@ -19,7 +19,7 @@ SOURCE = Source(0, "mavlink", "mavlink-1", "here")
 MAGICAL = st.one_of(st.binary(max_size=60), st.lists(st.sampled_from([0xFD, 0xFE, 0, 1, 255]), max_size=60).map(bytes))
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(st.lists(st.sampled_from(FRAMES), max_size=12), st.lists(MAGICAL, max_size=12), st.data())
 def test_junk_between_frames_and_any_cut_of_the_stream_lose_no_frame(
     frames: list[bytes], junk: list[bytes], data: st.DataObject
@@ -35,7 +35,7 @@ def test_junk_between_frames_and_any_cut_of_the_stream_lose_no_frame(
     assert known == frames
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(MAGICAL | st.binary(max_size=400))
 def test_no_bytes_raise_in_the_scanner_or_the_decoder(data: bytes) -> None:
     scanner = FrameScanner()
@@ -46,7 +46,7 @@ def test_no_bytes_raise_in_the_scanner_or_the_decoder(data: bytes) -> None:
     assert decoder.refused is None
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(st.integers(0, len(FRAMES) - 1), st.data())
 def test_a_flipped_byte_is_never_decoded(index: int, data: st.DataObject) -> None:
     """CRC-16 finds every change within one byte; a change of the id or the length can make it another kind of failure."""
@@ -60,7 +60,7 @@ FIELD = st.integers(-(2**31), 2**31 - 1)
 SPEED = st.integers(-32768, 32767)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     st.integers(0, 2**32 - 1),
     st.tuples(FIELD, FIELD, FIELD, FIELD),

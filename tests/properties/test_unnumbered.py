@@ -24,7 +24,7 @@ SIGMAS = st.none() | st.floats(1e-6, 655.0)
 PLOTS = st.tuples(st.floats(-3.0, 3.0), RANGES, AZIMUTHS, ELEVATIONS, SIGMAS)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(st.lists(PLOTS, max_size=6), min_size=2, max_size=12))
 def test_whatever_plots_say_nothing_raises(
     scans: list[list[tuple[float, float | None, float | None, float | None, float | None]]],
@@ -48,7 +48,7 @@ def test_whatever_plots_say_nothing_raises(
         assert (density.counts > 0.0).all()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     st.floats(500.0, 60_000.0), st.floats(-3.1, 3.1), st.floats(-0.3, 1.2), st.floats(1.0, 100.0), st.floats(1e-4, 5e-3)
 )
