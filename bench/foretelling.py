@@ -10,11 +10,14 @@ from __future__ import annotations
 import json
 import sys
 import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bench.measure import Figure, alone
 
-ESTIMATORS = ("kalman", "rmimm")
+if TYPE_CHECKING:
+    from gateway.settings import EstimatorName
+
+ESTIMATORS: tuple[EstimatorName, ...] = ("kalman", "rmimm")
 AIRCRAFT, HORIZONS_S = 1000, (10.0, 30.0, 60.0, 120.0)
 ROUND_MS, PART_MS = 50.0, 10.0
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gateway.geodesy import ecef_to_geodetic, enu_axes, geodetic_to_ecef, wrap_rad
+from gateway.geodesy import ecef_to_geodetic, enu_axes, geodetic_to_ecef
 from gateway.settings import RadarSite, Runway
 
 Floats = NDArray[np.float64]
@@ -149,13 +149,3 @@ def polar_jacobian(radar_m: ArrayLike) -> Floats:
     steep = -z / (square * level)
     jacobian[..., 2, 0], jacobian[..., 2, 1], jacobian[..., 2, 2] = x * steep, y * steep, level / square
     return jacobian
-
-
-def compass_azimuth_rad(azimuth_rad: ArrayLike, compass_boresight_rad: float) -> Floats:
-    """004's azimuth, clockwise from true north in [0, 2 pi), of 003's, counter-clockwise from the boresight."""
-    return np.asarray((compass_boresight_rad - np.asarray(azimuth_rad, dtype=np.float64)) % (2.0 * math.pi))
-
-
-def radar_azimuth_rad(compass_rad: ArrayLike, compass_boresight_rad: float) -> Floats:
-    """003's azimuth in (-pi, pi], counter-clockwise from the boresight, of 004's, clockwise from true north."""
-    return wrap_rad(compass_boresight_rad - np.asarray(compass_rad, dtype=np.float64))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.estimators.turns_and_straights import FULL_TURN
 from gateway.frames import RunwayFrame, turn
 from gateway.observation import FlightPlan, Intent, PlanPoint
 from gateway.predict.told import Told
@@ -25,7 +26,6 @@ PLANNED = range(0, 10)
 DECLARED, HOME = 10, 11
 PUBLISHED = range(12, 16)
 RUNWAY, GO_AROUND = 16, 17
-FULL_TURN = 2.0 * math.pi
 SAME_PLACE_RAD = 1e-6
 GO_AROUND_M = 5000.0  # beyond the runway's far end
 

@@ -13,11 +13,9 @@ from pyproj import Transformer
 from gateway.frames import (
     RadarFrame,
     RunwayFrame,
-    compass_azimuth_rad,
     level_axes,
     polar_from_xyz,
     polar_jacobian,
-    radar_azimuth_rad,
     turn,
     xyz_from_polar,
 )
@@ -203,27 +201,6 @@ def test_polar_jacobian_is_finite_above_the_antenna() -> None:
     assert np.isfinite(polar_jacobian([[0.0, 0.0, 500.0], [0.0, 0.0, 0.0]])).all()
 
 
-@given(st.floats(-math.pi, math.pi), st.floats(0.0, 2.0 * math.pi))
-def test_compass_and_radar_azimuth_convert_into_each_other(azimuth: float, boresight: float) -> None:
-    """One conversion leads from 003's azimuth to 004's and back, and 004's lies in [0, 2 pi)."""
-    compass = float(compass_azimuth_rad(azimuth, boresight))
-    assert 0.0 <= compass <= 2.0 * math.pi
-    back = float(radar_azimuth_rad(compass, boresight))
-    assert abs(math.remainder(back - azimuth, 2.0 * math.pi)) < 1e-14  # two roundings of numbers below 10
-
-
-def test_compass_azimuth_is_the_direction_in_which_the_aircraft_is() -> None:
-    """004's azimuth of an aircraft is the compass direction from the antenna to it, whichever way the radar looks."""
-    frame = RunwayFrame(DEMO_SITE.runway)
-    north_east = np.array([1000.0, 1000.0, 0.0])
-    for boresight_deg in (0.0, 45.0, 91.0, 180.0, 270.0, 359.0):
-        site = _radar(boresight_deg)
-        radar = RadarFrame.of(site, frame)
-        azimuth = polar_from_xyz(radar.from_enu(north_east + radar.antenna_enu_m))[1]
-        compass = compass_azimuth_rad(azimuth, site.compass_boresight_rad)
-        assert math.degrees(float(compass)) == pytest.approx(45.0, abs=1e-9)
-
-
 def test_far_from_the_runway_the_horizontal_is_tilted() -> None:
     """Vectors turn into the ENU of where the aircraft is: 50 km west, the runway's up leans 0.45 degrees."""
     frame = RunwayFrame(DEMO_SITE.runway)
@@ -253,12 +230,7 @@ def test_one_vector_has_the_bits_that_it_has_among_many() -> None:
         polar = polar_from_xyz(xyz)
         back = radar.to_enu(xyz_from_polar(polar))
         parts = [latitude, longitude, height, frame.runway_from_geodetic(latitude, longitude, height), xyz, polar, back]
-        return [
-            *parts,
-            polar_jacobian(xyz),
-            frame.local_from_enu(latitude, longitude),
-            radar_azimuth_rad(longitude, 1.0),
-        ]
+        return [*parts, polar_jacobian(xyz), frame.local_from_enu(latitude, longitude)]
 
     many = all_of(given_m)
     for i in range(len(given_m)):
