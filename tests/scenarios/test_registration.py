@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import math
 from pathlib import Path
@@ -40,9 +42,17 @@ def test_what_a_radar_measures_too_much_is_found_and_kept(session: Path, capsys:
     assert found["prior_chi_square"] < 16.3
 
 
-def test_it_is_said_in_words(session: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["register", str(session)]) == 0
-    told = capsys.readouterr().out
+@pytest.fixture(scope="module")
+def registered(session: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
+    """What is said of it, and the site file that was written."""
+    written = tmp_path_factory.mktemp("site") / "registered.toml"
+    with contextlib.redirect_stdout(io.StringIO()) as told:
+        assert run(["register", str(session), "--write-site", str(written)]) == 0
+    return told.getvalue(), written
+
+
+def test_it_is_said_in_words(registered: tuple[str, Path]) -> None:
+    told, _ = registered
     assert "range: measures 1" in told
     assert "m too far" in told
     assert "to be applied" in told
@@ -50,10 +60,9 @@ def test_it_is_said_in_words(session: Path, capsys: pytest.CaptureFixture[str]) 
 
 
 def test_what_was_found_goes_into_the_site_file_and_is_taken_off_from_then_on(
-    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    session: Path, registered: tuple[str, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    written = tmp_path / "registered.toml"
-    assert run(["register", str(session), "--write-site", str(written), "--quiet"]) == 0
+    _, written = registered
     (radar,) = parse_site(written.read_text()).radars
     assert radar.range_error_m == pytest.approx(150.0, abs=15.0)
     assert math.degrees(radar.azimuth_error_rad) == pytest.approx(0.5, abs=0.03)
