@@ -183,7 +183,9 @@ class Registration:
             return replace(given_up, evidence=evidence, solution=None, is_new=False), said
         wrong = solution.prior_chi_square > PRIOR_CHI_SQUARE
         choices = dict(given_up.choices)
-        if wrong and not self.is_prior_wrong:
+        # of so few aircraft nobody can tell what they have in common from what is each one's own: not trusted, not said
+        is_told = wrong and max(evidence.seen, default=0) > FEW
+        if is_told and not self.is_prior_wrong:
             said.append(Said("warning", _prior_in_words(solution)))
         pairs = dict(zip(evidence.radars, evidence.pairs, strict=True))
         for number in solution.radars:
@@ -196,7 +198,7 @@ class Registration:
             )
             said += [Said("info", text) for text in told]
         known = replace(given_up, evidence=evidence, solution=solution, solved_at=at, is_new=False)
-        return replace(known, choices=choices, is_prior_wrong=wrong, doubted=doubted), said
+        return replace(known, choices=choices, is_prior_wrong=is_told, doubted=doubted), said
 
     def _stepping(self, radars: Mapping[int, RadarSite], at: int, ahead: int) -> Registration:
         """A step further towards what is to be taken off; what held before anything that can still come is forgotten."""

@@ -229,6 +229,14 @@ def test_position_sources_that_are_all_off_beyond_what_is_allowed_are_said_and_n
     assert np.array_equal(sky.taken_off(200.0), NOTHING)
 
 
+def test_of_one_aircraft_that_is_off_nothing_is_said_of_all_position_sources() -> None:
+    sky = Sky(count=1, common_m=(150.0, -120.0, 100.0))
+    sky.watch(0, 100)
+    assert not sky.heard("the position sources together")
+    assert not sky.state.is_prior_wrong
+    assert np.array_equal(sky.taken_off(200.0), NOTHING)
+
+
 def test_what_is_told_is_what_is_known() -> None:
     sky = Sky()
     sky.watch(0, 150)
