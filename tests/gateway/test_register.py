@@ -230,7 +230,7 @@ def test_position_sources_that_are_all_off_beyond_what_is_allowed_are_said_and_n
 
 
 def test_of_one_aircraft_that_is_off_nothing_is_said_of_all_position_sources() -> None:
-    sky = Sky(count=1, common_m=(150.0, -120.0, 100.0))
+    sky = Sky(count=1, common_m=(600.0, -500.0, 300.0))
     sky.watch(0, 100)
     assert not sky.heard("the position sources together")
     assert not sky.state.is_prior_wrong
