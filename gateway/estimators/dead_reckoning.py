@@ -58,12 +58,6 @@ class Innovation:
     off: Floats
     covariance: Floats
 
-    @property
-    def square(self) -> Floats:
-        """Normalised, (...,): chi-square with m degrees of freedom where the filter is right."""
-        whitened = np.linalg.solve(self.covariance, self.off[..., None])[..., 0]
-        return np.asarray(np.sum(self.off * whitened, axis=-1))
-
 
 def started(
     motion: Motion,

@@ -67,6 +67,9 @@ class Flows:
 
 def cleaned(track: Track) -> Track:
     """Without points that nothing could have flown to: each further from the last good one than time allows, and back."""
+    steps = np.abs(np.diff(track.place_m, axis=0)) / np.maximum(np.diff(track.time_s), 1.0)[:, None]
+    if (np.hypot(steps[:, 0], steps[:, 1]) <= _FASTEST_MPS).all() and (steps[:, 2] <= _STEEPEST_MPS).all():
+        return track
     kept = np.zeros(len(track.time_s), dtype=bool)
     off = np.linalg.norm(track.place_m - np.median(track.place_m, axis=0), axis=1)
     begin = int(np.argmin(np.abs(off - np.median(off))))  # a point that is surely good

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators import flight_path as paths
-from gateway.geodesy import ecef_to_geodetic, enu_axes, geodetic_to_ecef
+from gateway.frames import RunwayFrame
 from gateway.offline.parameters import Flown, Parameters, Times
+from gateway.settings import Runway
 
 Floats = NDArray[np.float64]
 Place = tuple[float, float]  # latitude, longitude, rad
@@ -104,9 +105,7 @@ class Sortie:
             return None
         east, north = self.path_m.T
         curved = -(east**2 + north**2) / (2.0 * paths.EARTH_M)  # on the ellipsoid, not on the plane that touches it
-        around = enu_axes(*self.lift_off).T
-        ecef = np.stack([east, north, curved], axis=-1) @ around.T + geodetic_to_ecef(*self.lift_off, 0.0)
-        latitude, longitude, _ = ecef_to_geodetic(ecef)
+        latitude, longitude, _ = _frame(self.lift_off).geodetic_from_enu(np.stack([east, north, curved], axis=-1))
         return np.degrees(np.stack([latitude, longitude], axis=-1))
 
     @property
@@ -239,10 +238,12 @@ def _heights(flown: Flown, part: slice) -> tuple[Floats, Floats | None, str]:
 
 def level_m(latitude_rad: Floats, longitude_rad: Floats, lift_off: Place) -> Floats:
     """East and north (n, 2) of lift-off, m, of places on the ellipsoid."""
-    here = np.zeros_like(latitude_rad)
-    axes = enu_axes(*lift_off)[:2]
-    from_here = geodetic_to_ecef(latitude_rad, longitude_rad, here) - geodetic_to_ecef(*lift_off, 0.0)
-    return np.stack([from_here @ axis for axis in axes], axis=-1)
+    return _frame(lift_off).enu_from_geodetic(latitude_rad, longitude_rad, np.zeros_like(latitude_rad))[..., :2]
+
+
+def _frame(lift_off: Place) -> RunwayFrame:
+    """East, north and up at a place on the ellipsoid."""
+    return RunwayFrame(Runway(*lift_off, height_m=0.0, landing_compass_rad=0.0))
 
 
 def _nearest_place(places: tuple[Times, Floats], at: int) -> Place | None:

@@ -107,16 +107,15 @@ def _of_session(folder: Path) -> list[tuple[str, Floats]]:
 
 def _parted(names: NDArray[np.object_], rows: Floats) -> list[tuple[str, Floats]]:
     """The rows of each name in the order of time, once for each time, parted where it was silent for long."""
+    known = np.array([name is not None for name in names.tolist()])
+    unique, whose = np.unique(names[known].astype(str), return_inverse=True)
+    order = np.lexsort((rows[known, 0], whose))
+    sorted_rows = rows[known][order]
     flights = []
-    for name in dict.fromkeys(names.tolist()):
-        if name is None:
-            continue
-        own = rows[names == name]
-        own = own[np.unique(own[:, 0], return_index=True)[1]]
-        parts = np.split(own, np.flatnonzero(np.diff(own[:, 0]) > _SILENCE_S) + 1)
-        flights += [
-            (str(name) if len(parts) == 1 else f"{name} ({number})", part) for number, part in enumerate(parts, 1)
-        ]
+    for name, own in zip(unique.tolist(), np.split(sorted_rows, np.cumsum(np.bincount(whose))[:-1]), strict=True):
+        once = own[np.concatenate([[True], np.diff(own[:, 0]) > 0.0])]
+        parts = np.split(once, np.flatnonzero(np.diff(once[:, 0]) > _SILENCE_S) + 1)
+        flights += [(name if len(parts) == 1 else f"{name} ({number})", part) for number, part in enumerate(parts, 1)]
     return flights
 
 

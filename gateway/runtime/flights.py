@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from adapters.decode import Decoder
-from gateway.observation import AirData, Attitude, GpsReport, Many, VehicleStatus
+from gateway.observation import AirData, Attitude, GpsReport, Many, Observation, VehicleStatus
 from gateway.offline.parameters import Parameters
 from gateway.offline.reconstruction import Sortie
 from gateway.runtime.playback import Playback
@@ -38,7 +38,11 @@ def read_parameters(playback: Playback, tell: Callable[[float], None]) -> dict[s
     while some := list(islice(left, _TOGETHER)):
         for _, heard in decoder.hear_many(some)[0]:
             for observation in heard.observations:
-                for one in observation if isinstance(observation, Many) else (observation,):
+                if isinstance(observation, Many):
+                    several: Iterable[Observation] = observation if observation.kind is AirData else ()
+                else:
+                    several = (observation,)
+                for one in several:
                     if isinstance(one, AirData | Attitude | GpsReport | VehicleStatus):
                         found.setdefault(one.aircraft, Parameters()).take(one)
         tell(playback.fraction())

@@ -85,17 +85,17 @@ def _sortie(recording: rr.RecordingStream, name: str, sortie: Sortie, offset_m: 
     for kind, points, colour, width in lines:
         drawn = rr.LineStrips3D([points], colors=[colour], radii=style.points(width))
         recording.log(entity("flight", name, kind), drawn, static=True)
-    if sortie.geodetic_deg is not None:
-        recording.log(
-            entity("map", name),
-            rr.GeoLineStrings(lat_lon=[sortie.geodetic_deg], colors=[style.FUSED], radii=style.points(2.0)),
-            static=True,
-        )
-    _aircraft(recording, name, sortie, path)
+    lat_lon = sortie.geodetic_deg
+    if lat_lon is not None:
+        way = rr.GeoLineStrings(lat_lon=[lat_lon], colors=[style.FUSED], radii=style.points(2.0))
+        recording.log(entity("map", name), way, static=True)
+    _aircraft(recording, name, sortie, path, lat_lon)
     _plots(recording, name, sortie)
 
 
-def _aircraft(recording: rr.RecordingStream, name: str, sortie: Sortie, path_m: Floats) -> None:
+def _aircraft(
+    recording: rr.RecordingStream, name: str, sortie: Sortie, path_m: Floats, lat_lon_deg: Floats | None
+) -> None:
     some = _thinned(sortie)
     corners = np.array(OUTLINE).reshape(-1, 3)
     symbol = entity("flight", name, "aircraft")
@@ -109,10 +109,10 @@ def _aircraft(recording: rr.RecordingStream, name: str, sortie: Sortie, path_m: 
     )
     when = rr.TimeColumn("utc", timestamp=sortie.time[some].astype("datetime64[ns]"))
     recording.send_columns(symbol, [when], place)
-    if sortie.geodetic_deg is not None:
+    if lat_lon_deg is not None:
         here = entity("map", name, "aircraft")
         recording.log(here, rr.GeoPoints.from_fields(colors=style.FUSED, radii=style.points(6.0)), static=True)
-        recording.send_columns(here, [when], rr.GeoPoints.columns(positions=sortie.geodetic_deg[some]))
+        recording.send_columns(here, [when], rr.GeoPoints.columns(positions=lat_lon_deg[some]))
 
 
 def _plots(recording: rr.RecordingStream, name: str, sortie: Sortie) -> None:

@@ -134,7 +134,7 @@ def run(runs: int = 50, seed: int = 1, *, rrd: Path | None = None, progress: Pro
     progress("closing", 0.0)
     tables = [_closing(runs, seed, figures)]
     progress("heights", 0.4)
-    tables.append(_heights(seed, figures))
+    tables.append(heights(seed, figures))
     progress("sorties", 0.5)
     tables.append(_sorties(runs, seed, figures))
     progress("what closing does not see", 0.7)
@@ -175,7 +175,7 @@ def _closing(runs: int, seed: int, figures: dict[str, float]) -> Table:
     return Table(title, columns, tuple(rows))
 
 
-def _heights(seed: int, figures: dict[str, float]) -> Table:
+def heights(seed: int, figures: dict[str, float]) -> Table:
     """An angle of attack of 2 degrees is taken for climb."""
     flown = flight(seed, angle_of_attack_rad=math.radians(2.0))
     said = recorded(flown, seed)

@@ -64,7 +64,7 @@ def test_roll_changes_nothing() -> None:
 def test_the_height_is_that_of_the_pressure() -> None:
     """Two degrees of angle of attack are kilometres by pitch, hundreds of metres once closed, metres by pressure."""
     figures: dict[str, float] = {}
-    study._heights(11, figures)
+    study.heights(11, figures)
     assert figures["height by pitch, open"] > 3000.0
     assert 100.0 < figures["height by pitch, closed"] < 1000.0
     assert figures["height by pressure"] < 5.0
