@@ -255,10 +255,9 @@ def replay(
             Viewing(looks) as viewing,
             Display(viewing, quiet=telling.quiet, as_json=telling.json, fraction=playback.fraction) as display,
         ):
-            for note in playback.notes:
+            passing = (_SMOOTHED_IN_PASSING,) if smooth and seen.archive is None else ()
+            for note in (*playback.notes, *passing):
                 display.say(note)
-            if smooth and seen.archive is None:
-                display.say(_SMOOTHED_IN_PASSING)
             summary = run_replay(
                 playback,
                 setup,

@@ -159,17 +159,8 @@ def update(
     outlying = np.zeros(len(y), dtype=np.bool_)
     if robust is not None:
         limit = robust * robust * np.maximum(measured.sum(axis=1), 1)
-        nearest: slice | NDArray[np.int64] = slice(None)
-        if together > 1:
-            first = np.arange(0, len(y), together)
-            nearest = np.repeat(first + normalised.reshape(-1, together).argmin(axis=1), together)
-        best = normalised[nearest]
-        outlying = best > limit
-        if outlying.any():
-            # S must grow by the factor, not R: a confident prediction would otherwise hold out for ever.
-            spread = s[:, _ALONG[:m], _ALONG[:m]][nearest]
-            growth = (np.where(outlying, best / limit, 1.0)[:, None] - 1.0) * spread
-            growth = np.where(missing, 0.0, growth)
+        outlying, growth = _growth(normalised, limit, s, missing, together)
+        if growth is not None:
             r = r + growth
             s[:, _ALONG[:m], _ALONG[:m]] += growth
             inverse = np.linalg.inv(s)
@@ -181,6 +172,27 @@ def update(
     covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))
     told = Innovation(y, s, measured, normalised, outlying, h, np.asarray(inverse), gain, r)
     return Estimate(mean, covariance), told
+
+
+def _growth(
+    normalised: Floats, limit: Floats, s: Floats, missing: NDArray[np.bool_], together: int
+) -> tuple[NDArray[np.bool_], Floats | None]:
+    """Which rows (n,) lie further out than their limit, and by what (n, m) their noise grows until they are just there.
+
+    S must grow by the factor, not R: a confident prediction would otherwise hold out for ever. None where no row does.
+    """
+    nearest: slice | NDArray[np.int64] = slice(None)
+    if together > 1:
+        first = np.arange(0, len(normalised), together)
+        nearest = np.repeat(first + normalised.reshape(-1, together).argmin(axis=1), together)
+    best = normalised[nearest]
+    outlying = best > limit
+    if not outlying.any():
+        return outlying, None
+    measures = missing.shape[1]
+    spread = s[:, _ALONG[:measures], _ALONG[:measures]][nearest]
+    growth = (np.where(outlying, best / limit, 1.0)[:, None] - 1.0) * spread
+    return outlying, np.where(missing, 0.0, growth)
 
 
 _IDENTITIES = {size: np.eye(size) for size in (SIZE, SIZE + 2)}  # `holding` has two numbers more

@@ -184,24 +184,22 @@ def _state(check: SequenceCheck) -> tuple[object, ...]:
 def test_many_at_once_are_heard_and_counted_as_one_by_one(
     seed: int, faults: dict[str, int], changes: dict[str, int], many: int, few: int
 ) -> None:
+    arrivals, leaps = (
+        _stream(seed, faults | changes),
+        "sets another date" in changes,
+    )  # the session's time may leap then
+    alone, together = Decoder(LINKS), Decoder(LINKS)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(waiting, "_FEW", few)
-        _compare_with_one_by_one(_stream(seed, faults | changes), many, leaps="sets another date" in changes)
-
-
-def _compare_with_one_by_one(arrivals: list[Arrival], many: int, *, leaps: bool) -> None:
-    """`leaps`: the session's time may, when it settles on the clock of a source."""
-    now = 0
-    alone, together = Decoder(LINKS), Decoder(LINKS)
-    for first in range(0, len(arrivals), many):
-        batch = arrivals[first : first + many]
-        one_by_one = [(place, heard) for place, one in enumerate(batch) if (heard := alone.hear(one)) is not None]
-        said, refused = together.hear_many(batch)
-        assert repr(_in_order(said)) == repr(_in_order(one_by_one))  # bit for bit
-        assert leaps or [heard.now for _, heard in said] == sorted(heard.now for _, heard in said)
-        assert refused == []
-        now = batch[-1].received_at
-        assert _all_of(together, now) == _all_of(alone, now)
+        for first in range(0, len(arrivals), many):
+            batch = arrivals[first : first + many]
+            one_by_one = [(place, heard) for place, one in enumerate(batch) if (heard := alone.hear(one)) is not None]
+            said, refused = together.hear_many(batch)
+            assert repr(_in_order(said)) == repr(_in_order(one_by_one))  # bit for bit
+            assert leaps or [heard.now for _, heard in said] == sorted(heard.now for _, heard in said)
+            assert refused == []
+            now = batch[-1].received_at
+            assert _all_of(together, now) == _all_of(alone, now)
 
 
 @given(
