@@ -19,6 +19,7 @@ from gateway.align import SECOND, Fix, Plot
 from gateway.associate import Association, Span, Spans
 from gateway.estimators.registration_evidence import Pairs
 from gateway.frames import RadarFrame, polar_from_xyz, polar_jacobian
+from gateway.geodesy import wrap_rad
 from gateway.track import Key, RadarTracks
 
 Floats = NDArray[np.float64]
@@ -65,7 +66,7 @@ def gathered(
         level[mine] = np.hypot(local[:, 0], local[:, 1])
         expected[seen] = polar_from_xyz(frame.from_enu(carried[seen]))
     off = said - expected
-    off[:, 1] -= 2.0 * math.pi * np.round(off[:, 1] / (2.0 * math.pi))
+    off[:, 1] = wrap_rad(off[:, 1])
     is_near = np.abs(elapsed_s) <= WITHIN_NS / SECOND
     weight = np.where(np.isnan(off) | ~is_near[:, None], 0.0, sigma**-2.0)
     total, weighed = np.zeros((count, 3)), np.zeros((count, 3))

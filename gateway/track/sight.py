@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.frames import polar_from_xyz, polar_jacobian
+from gateway.geodesy import wrap_rad
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -35,7 +36,7 @@ class RadarSight:
     def off(self, value: Floats, expected: Floats) -> Floats:
         """Differences; azimuths the short way round."""
         off = value - expected
-        off[1] -= 2.0 * math.pi * np.round(off[1] / (2.0 * math.pi))
+        off[1] = wrap_rad(off[1])
         return off
 
     def placed(self, value: Floats, variance: Floats) -> tuple[Bools, Floats, Floats]:
