@@ -5,6 +5,7 @@ A site file is TOML with the unit in every key's name; inside, everything is SI 
 
 from gateway.settings.options import AssociationRule, EstimatorName, Mute, Options, Registering, Weighting
 from gateway.settings.reading import SiteError, parse_site
+from gateway.settings.safety import Separation, Stabilised
 from gateway.settings.site import (
     DEMO_SITE,
     DecisionPoint,
@@ -32,8 +33,10 @@ __all__ = [
     "RadarSite",
     "Registering",
     "Runway",
+    "Separation",
     "Site",
     "SiteError",
+    "Stabilised",
     "Units",
     "Waypoint",
     "Weather",

@@ -48,6 +48,6 @@ class Options:
     tentative_end_after_s: float = 15.0  # or for this long, if never confirmed: three of the slowest usual reports
     returns_within_s: float = 300.0  # an aircraft silent no longer than this comes back as its old track
     prediction_period_s: float = 1.0
-    horizons_s: tuple[float, ...] = (10.0, 30.0, 60.0)
+    horizons_s: tuple[float, ...] = (10.0, 30.0, 60.0, 120.0)
     begins_at: int | None = None  # stamp; what came before is heard for its clocks, plans and places, and not fused
     mutes: tuple[Mute, ...] = ()

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from gateway.settings.safety import Separation, Stabilised
 from gateway.settings.site import DecisionPoint, Estimation, PositionSource, RadarSite, Runway, Site, Waypoint, Weather
 
 
@@ -126,6 +127,27 @@ _TABLES: dict[str, _Table] = {
             "mode_lasts_s": ("mode_lasts_s", _number(0.1, 1e4)),
         }
     ),
+    "separation": _Table(
+        {
+            "horizontal_m": ("horizontal_m", _POSITIVE),
+            "vertical_m": ("vertical_m", _POSITIVE),
+            "look_ahead_s": ("look_ahead_s", _number(10.0, 3600.0)),
+            "least_probability": ("least_probability", _number(0.0, 1.0)),
+            "least_height_m": ("least_height_m", _number(-1e4, 1e4)),
+        }
+    ),
+    "stabilised": _Table(
+        {
+            "upper_gate_m": ("upper_gate_m", _POSITIVE),
+            "lower_gate_m": ("lower_gate_m", _POSITIVE),
+            "approach_speed_mps": ("approach_speed_mps", _number(1.0, 1000.0)),
+            "glide_path_deg": ("glide_path_rad", _number(0.01, 30.0, scale=_RAD)),
+            "centreline_deg": ("centreline_rad", _number(0.01, 30.0, scale=_RAD)),
+            "least_vertical_m": ("least_vertical_m", _number(0.0, 1e3)),
+            "least_lateral_m": ("least_lateral_m", _number(0.0, 1e3)),
+            "speed_share": ("speed_share", _number(0.01, 10.0)),
+        }
+    ),
     "radar": _Table(
         {
             "number": ("number", _whole(1, 65535)),
@@ -174,6 +196,8 @@ _TABLES: dict[str, _Table] = {
             "polygon_deg": ("polygon_rad", _polygon),
             "from": ("valid_from", _instant),
             "until": ("valid_until", _instant),
+            "base_msl_m": ("base_msl_m", _number(-1e4, 1e5)),
+            "top_msl_m": ("top_msl_m", _number(-1e4, 1e5)),
         },
         required=("name",),
         many=True,
@@ -218,6 +242,8 @@ def parse_site(text: str, name: str = "site file") -> Site:
         runway=runway,
         position=PositionSource(**(rows("position") or [{}])[0]),
         estimation=Estimation(**(rows("estimation") or [{}])[0]),
+        separation=Separation(**(rows("separation") or [{}])[0]),
+        stabilised=Stabilised(**(rows("stabilised") or [{}])[0]),
         radars=radars,
         decision_points=tuple(DecisionPoint(**row) for row in rows("decision_point")),
         waypoints=tuple(Waypoint(**row) for row in rows("waypoint")),

@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from gateway.settings.safety import Separation, Stabilised
+
 Units = Literal["si", "aviation"]
 PlotNumbers = Literal["used", "ignored"]
 
@@ -120,7 +122,9 @@ class Waypoint:
 
 @dataclass(frozen=True, slots=True)
 class Weather:
-    """An area to avoid: a circle about a point, or a polygon; between two times where they are given (ISO 8601, UTC)."""
+    """An area to avoid: a circle about a point, or a polygon; between two times where they are given (ISO 8601, UTC),
+    and between two heights above mean sea level.
+    """
 
     name: str
     latitude_rad: float | None = None
@@ -129,6 +133,8 @@ class Weather:
     polygon_rad: tuple[tuple[float, float], ...] = ()
     valid_from: str | None = None
     valid_until: str | None = None
+    base_msl_m: float | None = None
+    top_msl_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +145,8 @@ class Site:
     runway: Runway
     position: PositionSource = PositionSource()
     estimation: Estimation = Estimation()
+    separation: Separation = Separation()
+    stabilised: Stabilised = Stabilised()
     radars: tuple[RadarSite, ...] = ()
     decision_points: tuple[DecisionPoint, ...] = ()
     waypoints: tuple[Waypoint, ...] = ()

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable
 
+from gateway.settings.safety import Separation, Stabilised
 from gateway.settings.site import SLOWEST_MPS, Estimation, PositionSource, RadarSite, Runway, Site, Weather
 
 
@@ -15,6 +17,7 @@ def format_site(site: Site) -> str:
     """
     lines = [f"name = {_quoted(site.name)}", "", "[display]", f'units = "{site.units}"                # or "aviation"']
     lines += ["", "[runway]", *_runway(site.runway), "", *_position(site.position), "", *_estimation(site.estimation)]
+    lines += ["", *_separation(site.separation), "", *_stabilised(site.stabilised)]
     for radar in site.radars:
         lines += ["", "[[radar]]", *_radar(radar)]
     for point in site.decision_points:
@@ -78,7 +81,47 @@ def _estimation(chosen: Estimation) -> list[str]:
         ("turn_share", chosen.turn_share, usual.turn_share, "both sides"),
         ("mode_lasts_s", chosen.mode_lasts_s, usual.mode_lasts_s, ""),
     )
-    lines = ["[estimation]                 # how aircraft fly, for --estimator imm and rmimm; nobody has to tune it"]
+    head = "[estimation]                 # how aircraft fly, for --estimator imm and rmimm; nobody has to tune it"
+    return [head, *_chosen(rows)]
+
+
+def _separation(chosen: Separation) -> list[str]:
+    usual = Separation()
+    says = {
+        "horizontal_m": "well clear; 5556 and 300 for a controlled approach",
+        "vertical_m": "nearer than both is a conflict",
+        "look_ahead_s": "no further than predictions reach",
+        "least_probability": "",
+        "least_height_m": "above the runway: nobody lower is probed",
+    }
+    rows = ((name, getattr(chosen, name), getattr(usual, name), said) for name, said in says.items())
+    return ["[separation]                 # what conflicts are probed for", *_chosen(rows)]
+
+
+def _stabilised(chosen: Stabilised) -> list[str]:
+    usual = Stabilised()
+    rows = (
+        ("glide_path_deg", math.degrees(chosen.glide_path_rad), math.degrees(usual.glide_path_rad), "above or below"),
+        ("centreline_deg", math.degrees(chosen.centreline_rad), math.degrees(usual.centreline_rad), "to either side"),
+        ("least_vertical_m", chosen.least_vertical_m, usual.least_vertical_m, "near the runway"),
+        ("least_lateral_m", chosen.least_lateral_m, usual.least_lateral_m, ""),
+        ("speed_share", chosen.speed_share, usual.speed_share, "faster than the approach speed"),
+    )
+    given = (
+        ("upper_gate_m", chosen.upper_gate_m, 305, "above the runway; by default 83 s to go"),
+        ("lower_gate_m", chosen.lower_gate_m, 152, "by default 41.5 s"),
+        ("approach_speed_mps", chosen.approach_speed_mps, 70, "by default the least that it flew on this final"),
+    )
+    optional = (
+        (name, example if value is None else value, None if value else example, said)
+        for name, value, example, said in given
+    )
+    return ["[stabilised]                 # an approach that is not is told", *_chosen((*optional, *rows))]
+
+
+def _chosen(rows: Iterable[tuple[str, float, float | None, str]]) -> list[str]:
+    """Lines of (key, value, default, what is said of it); what is as it is by default stands in a comment."""
+    lines = []
     for key, value, default, says in rows:
         line = f"{'# ' if value == default else ''}{key} = {value:.10g}"
         lines.append(f"{line:<44s} # {says}" if says else line)
@@ -125,7 +168,9 @@ def _weather(area: Weather) -> list[str]:
         )
         lines.append(f"polygon_deg = [{', '.join(corners)}]")
     times = (("from", area.valid_from), ("until", area.valid_until))
-    return [*lines, *(f'{key} = "{value}"' for key, value in times if value)]
+    heights = (("base_msl_m", area.base_msl_m), ("top_msl_m", area.top_msl_m))
+    lines += [f'{key} = "{value}"' for key, value in times if value]
+    return [*lines, *(f"{key} = {height:.10g}" for key, height in heights if height is not None)]
 
 
 def _place(latitude_rad: float, longitude_rad: float) -> tuple[str, str]:
