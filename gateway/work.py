@@ -37,10 +37,13 @@ class Work(Fusing):
         if self.now is None or now < self.now - self.history:
             self._start_again(now)
         due = self._next_check()
-        while (at := min(self.instant, due, self.predicting.due)) < now or (at == now and watermark):
+        while (at := min(self.instant, due, self.predicting.due, self.consistency.due)) < now or (
+            at == now and watermark
+        ):
             self.now = max(at, self.now or at)
             if at == self.predicting.due:
                 self._foretell(at)
+            self._judge(at)
             self._track_due()
             self._check_due()
             if at == self.instant:
@@ -62,14 +65,15 @@ class Work(Fusing):
         if quarter == 1:
             self._forget(at)
         elif quarter == 2:
+            self.consistency = self.consistency.planning(at)
             self._judge(at)
         elif quarter == 3:
             self._join_radars(at)
+            self._probe(at)
 
     def _judge(self, at: int) -> None:
-        """What scatters otherwise than stated."""
-        whole = at // SECOND * SECOND
-        self.consistency, findings = self.consistency.judged(self.site.position, self.radars, whole)
+        """What scatters otherwise than stated: of many sources, each share's at its own instant within the second."""
+        self.consistency, findings = self.consistency.judged(self.site.position, self.radars, at)
         for found in findings:
             self._say_scatter(found)
 
@@ -135,7 +139,8 @@ class Work(Fusing):
         self.tracks, self.association = RadarTracks(), Association()
         self.unnumbered = self.unnumbered.emptied()
         self.registration = self.registration.again(now)
-        self.predicting = self.predicting.planning((), now)
+        self.predicting, self.probing = self.predicting.planning((), now), predict.Probing()
+        self.consistency = self.consistency.again()
         # An arrival stamped at a whole second comes before what happens at that second.
         self.now, self.instant = now, (now - 1) // SECOND * SECOND + SECOND
 
@@ -253,3 +258,20 @@ class Work(Fusing):
             self.geoid.separation_m,
         )
         self.forecasts.append(made)
+        self.probing = self.probing.hearing(made.ways, at, self.options.prediction_period_s)
+
+    def _probe(self, at: int) -> None:
+        """Which tracks will lose their separation: of those that are surely something that flies."""
+        alive = {lane.number: lane for lane in self._alive() if lane.last.score == fuse.CONFIRMED}
+        if len(alive) < 2 and not self.probing.watched:
+            return
+        self.probing, found = self.probing.probed(at, list(alive), self.site.separation)
+        self.rounds.append(found)
+        for row, state in enumerate(found.state):
+            if state != "goes on":
+                names = {
+                    number: f"track {number}" + (f" ({lane.aircraft})" if lane.aircraft else "")
+                    for number, lane in alive.items()
+                }
+                level = "warning" if state == "found" else "info"
+                self.events.append(Event(at, level, predict.sentence(found, row, names, self.frame)))

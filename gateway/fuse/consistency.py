@@ -10,6 +10,7 @@ reason nothing is said of a receiver whose reports hardly scatter.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix, Plot
 from gateway.fuse.events import Event, Measure
-from gateway.fuse.evidence import ENOUGH, PLOT, REPORT, Part, evidence, factors, summed
+from gateway.fuse.evidence import ENOUGH, PLOT, REPORT, Part, changes_of, evidence, factors, summed
 from gateway.fuse.scatter import Rows, left_of_plots, left_of_reports, rows_of
 from gateway.settings import PositionSource, RadarSite
 
@@ -30,12 +31,15 @@ SURE = 12.0  # evidence that is sure of a single noise; of many, the logarithm o
 LASTING = 0.3  # a receiver whose reports scatter by less than this share of what is stated has errors that last
 TOGETHER_AT_LEAST, TOGETHER_ENOUGH = 3, 4.0 * ENOUGH  # aircraft, and squares of theirs, which are many soon
 MANY, WAIT_NS = 64, 5 * SECOND  # measurements that are judged at once, or all that came in so long
+SHARE, TRACKS_AT_LEAST = 200, 8  # of more measurements, of so many tracks or more each, each share has its own instant
+NOTHING_DUE = 1 << 62
 KEPT_PLOTS, KEPT_REPORTS = 6, 3  # of each track and source, to hold the next ones against
 KEPT_NS = 30 * SECOND
 NOISES_AT_MOST = 8192  # the least lately heard are forgotten
 FORGOTTEN_NS = 3600 * SECOND  # and those that were not heard for so long
 
 Key = tuple[str, str, bool]  # source, part, whether the site file sets its noise
+Share = tuple[tuple[int, Event], ...]  # measurements, each with its track
 ALL = "GPS"  # the source that all aircraft together are
 
 
@@ -49,13 +53,13 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What new measurements tell of one part of each: whose noises these are, and the sums of `evidence`, (n, 9)."""
+    """What new measurements tell of one part: of k noises, each with the last measurement, and its sums of `evidence`."""
 
     part: Part
     keys: list[Key]
     measures: list[Measure]
-    sigma: Floats  # (n,) as stated
-    evidence: Floats
+    sigma: Floats  # (k,) as stated
+    evidence: Floats  # (k, 9)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +69,8 @@ class Consistency:
     noises: Mapping[Key, int] = field(default_factory=dict)  # the row of each in what follows
     sums: Floats = field(default_factory=lambda: np.zeros((0, 9)))  # as `summed` has them
     heard: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # when each source was last
-    waiting: tuple[tuple[int, Event], ...] = ()
+    waiting: Share = ()
+    planned: tuple[tuple[int, Share], ...] = ()  # when which measurements are judged
     reports: Rows | None = None
     plots: Rows | None = None
 
@@ -83,52 +88,86 @@ class Consistency:
         """How much evidence is sure."""
         return SURE + math.log(max(len(self.noises), 1))
 
-    def judged(
-        self,
-        position: PositionSource,
-        radars: Mapping[int, RadarSite],
-        at: int = 0,
-    ) -> tuple[Consistency, list[Finding]]:
-        """At a whole second, the same with what waited worked in, and what is sure by now of the sources just heard.
+    @property
+    def due(self) -> int:
+        """When the next measurements are judged."""
+        return self.planned[0][0] if self.planned else NOTHING_DUE
 
-        A few measurements wait for others: many cost hardly more. Sources that were not heard for an hour are forgotten.
+    def planning(self, at: int) -> Consistency:
+        """Once a second, the same with what waits to be judged: a share from this instant on, the others within the second.
+
+        A few measurements wait for others: many cost hardly more. Sources that were not heard for long are forgotten.
         """
-        if len(self.waiting) < MANY and at % WAIT_NS:
-            return self, []
-        waiting = sorted(self.waiting, key=lambda one: one[1].measure.serial)
-        told, kept = [], []
-        for known, count, plots in ((self.reports, KEPT_REPORTS, False), (self.plots, KEPT_PLOTS, True)):
-            new = [one for one in waiting if isinstance(one[1].measure, Plot) == plots]
-            rows = rows_of(new).merged(known) if new else known
-            if rows is not None and new:
+        if len(self.waiting) < MANY and at // SECOND * SECOND % WAIT_NS:
+            return self
+        shares = _shares(self.waiting)
+        planned = tuple((at + place * SECOND // len(shares), share) for place, share in enumerate(shares))
+        reports, plots = (
+            None if rows is None else rows.in_order().latest(count, at - KEPT_NS)
+            for rows, count in ((self.reports, KEPT_REPORTS), (self.plots, KEPT_PLOTS))
+        )
+        return replace(
+            self,
+            waiting=(),
+            planned=(*self.planned, *planned),
+            reports=reports if reports is not None and len(reports.at) else None,
+            plots=plots if plots is not None and len(plots.at) else None,
+        )._remembered(at)
+
+    def judged(
+        self, position: PositionSource, radars: Mapping[int, RadarSite], at: int
+    ) -> tuple[Consistency, list[Finding]]:
+        """The same with what is due by an instant worked in, and what is sure by now of the sources just judged."""
+        after, found = self, list[Finding]()
+        while after.due <= at:
+            (_, share), planned = after.planned[0], after.planned[1:]
+            after, new = replace(after, planned=planned)._with(share, position, radars, at)
+            found += new
+        return after, found
+
+    def again(self) -> Consistency:
+        """The same where time was set back: what is known of noises stays, and no measurement is held against later ones."""
+        return Consistency(self.noises, self.sums, self.heard)
+
+    def _with(
+        self, share: Share, position: PositionSource, radars: Mapping[int, RadarSite], at: int
+    ) -> tuple[Consistency, list[Finding]]:
+        """The same with some measurements worked in, and what is sure by now of their sources."""
+        by_serial = sorted(share, key=lambda one: one[1].measure.serial)
+        told, kept = list[Told](), list[Rows | None]()
+        for known, count, is_plot in ((self.reports, KEPT_REPORTS, False), (self.plots, KEPT_PLOTS, True)):
+            new = [one for one in by_serial if isinstance(one[1].measure, Plot) == is_plot]
+            if new:
+                fresh = rows_of(new)
+                mine, others = (None, None) if known is None else known.parted(fresh.group)
+                rows = fresh.merged(mine)
                 told += _told(rows, [event for _, event in new], position, radars)
-            latest = None if rows is None else rows.latest(count, at - KEPT_NS)
-            kept.append(latest if latest is not None and len(latest.at) else None)
-        after = replace(self, waiting=(), reports=kept[0], plots=kept[1])
+                latest = rows.latest(count, at - KEPT_NS)
+                known = latest if others is None else latest.after(others)
+            kept.append(known)
+        after = replace(self, reports=kept[0], plots=kept[1])
         after, found = after._summed(told, at) if told else (after, [])
         return after._remembered(at), found
 
     def _summed(self, told: Sequence[Told], at: int) -> tuple[Consistency, list[Finding]]:
         """The same with evidence added to the sums, and what is sure by now."""
         everybody = [(ALL, one.part.name, True) for one in told if one.part in REPORT]
-        every = dict.fromkeys((*self.noises, *(key for one in told for key in one.keys), *everybody))
-        noises = {key: row for row, key in enumerate(every)}
-        added = np.zeros((len(noises), 9))
-        rows = [np.array([noises[key] for key in one.keys], dtype=np.int64) for one in told]
-        for one, place in zip(told, rows, strict=True):
-            np.add.at(added, place, one.evidence)
-        sums, heard = np.zeros((len(noises), 9)), np.full(len(noises), at)
-        sums[: len(self.sums)], heard[: len(self.heard)] = self.sums, self.heard
-        sums = summed(sums, added)
-        heard[np.concatenate(rows)] = at
+        every = (*(key for one in told for key in one.keys), *everybody)
+        new = dict.fromkeys(key for key in every if key not in self.noises)
+        noises = {**self.noises, **{key: len(self.noises) + row for row, key in enumerate(new)}} if new else self.noises
+        sums = np.concatenate([self.sums, np.zeros((len(new), 9))])
+        heard = np.concatenate([self.heard, np.full(len(new), at)])
+        heard[[noises[key] for key in every]] = at
         after = replace(self, noises=noises, sums=sums, heard=heard)
-        factor = factors(sums, after.sure)
         found: dict[tuple[str, str], Finding] = {}
-        for one, place in zip(told, rows, strict=True):
-            of_all = _together(one, place, noises, sums, added, factor, after.sure)
-            for row in np.flatnonzero(~np.isnan(factor[place])).tolist():
-                key = one.keys[row]
-                if not (key[2] and of_all) and (finding := _finding(one, row, key, float(factor[place[row]]))):
+        for one in told:
+            rows = [noises[key] for key in one.keys]
+            sums[rows] = summed(sums[rows], one.evidence)
+            factor = factors(sums[rows], after.sure)
+            of_all = _together(one, noises, sums, factor, after.sure)
+            for place in np.flatnonzero(~np.isnan(factor)).tolist():
+                key = one.keys[place]
+                if not (key[2] and of_all) and (finding := _finding(one, place, key, float(factor[place]))):
                     found[key[0], key[1]] = finding
             if of_all:
                 found[ALL, one.part.name] = of_all
@@ -147,6 +186,24 @@ class Consistency:
         )
 
 
+def _shares(waiting: Share) -> list[Share]:
+    """Measurements in shares of whole tracks, each of reports or of plots; few are one share."""
+    if len(waiting) <= SHARE:
+        return [waiting] if waiting else []
+    found: list[Share] = []
+    for is_plot in (False, True):
+        by_track: dict[int, list[tuple[int, Event]]] = {}
+        for one in waiting:
+            if isinstance(one[1].measure, Plot) == is_plot:
+                by_track.setdefault(one[0], []).append(one)
+        tracks = [by_track[track] for track in sorted(by_track)]
+        count = max(1, min(sum(map(len, tracks)) // SHARE, len(tracks) // TRACKS_AT_LEAST))
+        cuts = [place * len(tracks) // count for place in range(count + 1)]
+        parts = (tracks[first:last] for first, last in itertools.pairwise(cuts))
+        found += [tuple(one for track in part for one in track) for part in parts if part]
+    return found
+
+
 def _told(rows: Rows, events: Sequence[Event], position: PositionSource, radars: Mapping[int, RadarSite]) -> list[Told]:
     """What new measurements of one kind, reports or plots, tell of each of their parts; `rows` names them by number."""
     is_plot = isinstance(events[0].measure, Plot)
@@ -157,45 +214,49 @@ def _told(rows: Rows, events: Sequence[Event], position: PositionSource, radars:
     left, sigma = left.of(fresh), rows.sigma[fresh]
     new = [events[place] for place in rows.event[fresh].tolist()]
     measures = [event.measure for event in new]
-    sources = [_source(measure) for measure in measures]
-    said = np.array([_said(measure, position, radars) for measure in measures]).reshape(len(new), -1)
+    sources: dict[str | int, int] = {}
+    source = np.array([sources.setdefault(_source(measure), len(sources)) for measure in measures])
+    names = [f"radar {name}" if is_plot else f"GPS of {name}" for name in sources]
+    said = np.array([_said(name, position, radars) for name in sources])[source]
+    changes = changes_of(new, sigma.shape[1])
     found = []
     for number, part in enumerate(PLOT if is_plot else REPORT):
         stated = sigma[:, part.first]
-        is_set = (np.abs(stated - said[:, number]) <= 1e-9 * stated).tolist()
-        weighed = evidence(left, new, stated, part)
-        some = np.flatnonzero(
-            weighed.any(axis=1)
-        )  # the first measurements of a source tell nothing: no noise is watched yet
-        keys = [(sources[row], part.name, is_set[row]) for row in some.tolist()]
-        found.append(Told(part, keys, [measures[row] for row in some.tolist()], stated[some], weighed[some]))
+        is_set = np.abs(stated - said[:, number]) <= 1e-9 * stated
+        weighed = evidence(left, changes, stated, part)
+        # The first measurements of a source tell nothing: no noise is watched yet.
+        some = np.flatnonzero(weighed.any(axis=1))
+        noise, place = np.unique(2 * source[some] + is_set[some], return_inverse=True)
+        last, total = np.zeros(len(noise), dtype=np.int64), np.zeros((len(noise), 9))
+        last[place] = some
+        np.add.at(total, place, weighed[some])
+        keys = [(names[one >> 1], part.name, bool(one & 1)) for one in noise.tolist()]
+        found.append(Told(part, keys, [measures[row] for row in last.tolist()], stated[last], total))
     return found
 
 
-def _together(
-    told: Told, place: Ints, noises: Mapping[Key, int], sums: Floats, added: Floats, factor: Floats, sure: float
-) -> Finding | None:
+def _together(told: Told, noises: Mapping[Key, int], sums: Floats, factor: Floats, sure: float) -> Finding | None:
     """All aircraft whose noise the site file states as one source, but for those that are known to be off: into `sums`."""
-    chosen = np.unique(place[[key[2] for key in told.keys]])
+    is_set = np.array([key[2] for key in told.keys], dtype=np.bool_)
     row = noises.get((ALL, told.part.name, True))
-    if row is None or len(chosen) < TOGETHER_AT_LEAST:
+    if row is None or is_set.sum() < TOGETHER_AT_LEAST:
         return None
-    honest = chosen[np.isnan(factor[chosen])]
-    sums[row] = summed(sums[row : row + 1], added[honest].sum(axis=0, keepdims=True))[0]
+    added = told.evidence[is_set & np.isnan(factor)].sum(axis=0, keepdims=True)
+    sums[row] = summed(sums[row : row + 1], added)[0]
     (found,) = factors(sums[row : row + 1], sure, TOGETHER_ENOUGH).tolist()
-    first = next(row for row, key in enumerate(told.keys) if key[2])
-    return _finding(told, first, (ALL, told.part.name, True), found)
+    return _finding(told, int(is_set.argmax()), (ALL, told.part.name, True), found)
 
 
-def _source(measure: Measure) -> str:
-    return f"GPS of {measure.aircraft}" if isinstance(measure, Fix) else f"radar {measure.radar}"
+def _source(measure: Measure) -> str | int:
+    """An aircraft, or a radar's number."""
+    return measure.aircraft if isinstance(measure, Fix) else measure.radar
 
 
-def _said(measure: Measure, position: PositionSource, radars: Mapping[int, RadarSite]) -> tuple[float, ...]:
+def _said(source: str | int, position: PositionSource, radars: Mapping[int, RadarSite]) -> tuple[float, ...]:
     """The sigma of each part that the site file sets, NaN = none."""
-    if isinstance(measure, Fix):
+    if isinstance(source, str):
         return position.sigma_m, position.velocity_sigma_mps
-    radar = radars.get(measure.radar)
+    radar = radars.get(source)
     if radar is None:
         return math.nan, math.nan, math.nan
     return radar.range_sigma_m, radar.azimuth_sigma_rad, radar.elevation_sigma_rad

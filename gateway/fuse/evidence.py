@@ -81,7 +81,24 @@ def factors(sums: Floats, sure: float, enough: float = ENOUGH) -> Floats:
     return np.asarray(np.where(np.isnan(found[:, 0]), np.fmin(found[:, 1], found[:, 2]), found[:, 0]))
 
 
-def evidence(left: Left, events: Sequence[Event], sigma: Floats, part: Part) -> Floats:
+@dataclass(frozen=True, slots=True)
+class Changes:
+    """The filter's innovations, as changes from one of a source to the next, (n, k); NaN where there are none."""
+
+    change: Floats  # as measured
+    by_scatter: Floats  # in units of what they should scatter by
+
+
+def changes_of(events: Sequence[Event], size: int) -> Changes:
+    """Those of some events, of so many components each."""
+    nothing = np.full(size, math.nan)
+    told = [event.residual for event in events]
+    change = np.concatenate([nothing if one is None else one.change for one in told])
+    by_scatter = np.concatenate([nothing if one is None else one.change_by_scatter for one in told])
+    return Changes(change.reshape(-1, size), by_scatter.reshape(-1, size))
+
+
+def evidence(left: Left, changes: Changes, sigma: Floats, part: Part) -> Floats:
     """What each of n measurements tells of one part with stated noise (n,): (n, 9), to be `summed`.
 
     `left`: what `scatter` leaves over of them. Where that would be disturbed by manoeuvres the filter's innovations take its
@@ -91,12 +108,8 @@ def evidence(left: Left, events: Sequence[Event], sigma: Floats, part: Part) -> 
     some = part.components
     own, share = np.square(left.by_noise[:, some]), left.share[:, some]
     calm = left.disturbed[:, some] < DISTURBED
-    nothing = np.full(own.shape[1], math.nan)
-    told = [event.residual for event in events]
-    by_scatter = np.array(
-        [nothing if one is None or not part.by_filter else one.change_by_scatter[some] for one in told]
-    )
-    change = np.array([nothing if one is None else one.change[some] for one in told]) / sigma[:, None]
+    by_scatter = changes.by_scatter[:, some] if part.by_filter else np.full(own.shape, math.nan)
+    change = changes.change[:, some] / sigma[:, None]
     columns = (
         *_counted(np.where(calm, own, np.square(by_scatter)), np.where(calm, share, PAIR), FAR_UP),
         *_counted(own, share, FAR_DOWN),

@@ -79,10 +79,18 @@ class Rows:
             np.concatenate([before.event, self.event]),
         )
 
+    def in_order(self) -> Rows:
+        """Those of a track and source together, in order of time, and of arrival."""
+        return self.of(np.lexsort((self.event, self.at, self.group)))
+
+    def parted(self, groups: Ints) -> tuple[Rows, Rows]:
+        """Those of some groups, and the others."""
+        theirs = np.isin(self.group, groups)
+        return self.of(theirs), self.of(~theirs)
+
     def merged(self, kept: Rows | None) -> Rows:
         """These, all new, in order behind what was kept of the same groups; what came late or twice is left out."""
-        rows = self if kept is None else self.after(kept)
-        rows = rows.of(np.lexsort((rows.event, rows.at, rows.group)))
+        rows = (self if kept is None else self.after(kept)).in_order()
         again = np.zeros(len(rows.at), dtype=np.bool_)
         again[1:] = (rows.group[1:] == rows.group[:-1]) & (rows.at[1:] == rows.at[:-1])
         first = _firsts(rows)
@@ -130,12 +138,14 @@ def rows_of(told: Sequence[tuple[int, Event]]) -> Rows:
         value, sigma = np.array([plot.polar for plot in plots]), np.array([plot.sigma for plot in plots])
     else:
         fixes = [event.measure for event in events if isinstance(event.measure, Fix)]
-        value = np.concatenate([[fix.enu_m for fix in fixes], [fix.velocity_mps for fix in fixes]], axis=1)
+        value = np.concatenate([part for fix in fixes for part in (fix.enu_m, fix.velocity_mps)]).reshape(-1, 6)
         value[[not fix.has_height for fix in fixes], 2] = math.nan
-        speed_sigma = np.repeat([[fix.velocity_sigma_mps] for fix in fixes], 3, axis=1)
-        sigma = np.concatenate([[fix.sigma_m for fix in fixes], speed_sigma], axis=1)
+        sigma = np.empty(value.shape)
+        sigma[:, :3] = np.concatenate([fix.sigma_m for fix in fixes]).reshape(-1, 3)
+        sigma[:, 3:] = np.array([fix.velocity_sigma_mps for fix in fixes])[:, None]
     group = np.array([track for track, _ in told], dtype=np.int64) * RADARS + source
-    speed_mps = np.sqrt(np.square(np.array([event.mean for event in events])[:, VELOCITY]).sum(axis=1))
+    velocity = np.concatenate([event.mean[VELOCITY] for event in events]).reshape(-1, 3)
+    speed_mps = np.sqrt(np.square(velocity).sum(axis=1))
     return Rows(group, at, value, sigma, speed_mps, np.arange(len(told)))
 
 

@@ -194,7 +194,9 @@ def listened(tracks: Sequence[list[Event]], position: PositionSource, radars: di
     known, found, nearest = Consistency(), dict[str, float](), 0.0
     parts = [part.name for part in (*REPORT, *PLOT)]
     for second, some in itertools.groupby(told, key=lambda one: one[1].at // SECOND):
-        known, findings = known.hearing(some).judged(position, radars, (second + 1) * SECOND)
+        known, findings = (
+            known.hearing(some).planning((second + 1) * SECOND).judged(position, radars, (second + 2) * SECOND)
+        )
         for one in findings:
             part = next(name for name in parts if f"scatter of {name}," in one.topic)
             found.setdefault(part, second + 1.0 - told[0][1].at / SECOND)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from gateway.align import SECOND, Fix
+from gateway.fuse import consistency
 from gateway.fuse.consistency import NOISES_AT_MOST, PLOT, Consistency, Finding
 from gateway.fuse.events import Event, Job, Measure
 from gateway.fuse.evidence import factors, summed
@@ -44,7 +45,7 @@ def _judged(
     known, radars = Consistency(), {radar.number: radar for radar in world.site.radars}
     for second in range(told[0][1].at // SECOND, told[-1][1].at // SECOND + 1):
         known = known.hearing(one for one in told if one[1].at // SECOND == second)
-        known, new = known.judged(position, radars, (second + 1) * SECOND)
+        known, new = known.planning((second + 1) * SECOND).judged(position, radars, (second + 2) * SECOND - 1)
         for one in new:
             found.setdefault(one.topic, one)
     return known, found
@@ -225,6 +226,54 @@ def test_aircraft_are_judged_together(world: Any) -> None:
     assert list(found) == ["scatter of position, GPS of mavlink:0"]
 
 
+def test_many_are_judged_in_shares_within_the_second(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each share holds whole tracks and has its own instant; every measurement is in one, and each aircraft's sums are those
+    of all judged at once, to the bit."""
+    tracks = [_events(world, _reports(world, 20.0, seed=k, aircraft=f"mavlink:{k}")) for k in range(24)]
+    told = [(1 + place, event) for place, one in enumerate(tracks) for event in one]
+    at = told[-1][1].at // SECOND * SECOND + SECOND // 2
+    ends = []
+    for share in (100, 1000):
+        monkeypatch.setattr(consistency, "SHARE", share)
+        known = Consistency().hearing(told).planning(at)
+        instants, shares = zip(*known.planned, strict=True)
+        assert list(instants) == [at + place * SECOND // len(shares) for place in range(len(shares))]
+        assert sorted((track, event.at) for some in shares for track, event in some) == sorted(
+            (track, event.at) for track, event in told
+        )
+        assert len({track for some in shares for track in {track for track, _ in some}}) == len(tracks)
+        assert sum(len({track for track, _ in some}) for some in shares) == len(tracks)
+        assert known.judged(PositionSource(), {}, at - 1)[0].due == at
+        ends.append((len(shares), known.judged(PositionSource(), {}, at + SECOND)[0]))
+    assert [count for count, _ in ends] == [3, 1]
+    (_, parted), (_, whole) = ends
+    own = [key for key in whole.noises if key[0] != "GPS"]
+    assert len(own) == 2 * len(tracks)
+    for key in own:
+        assert parted.sums[parted.noises[key]].tobytes() == whole.sums[whole.noises[key]].tobytes()
+
+
+def test_how_arrivals_fall_into_ticks_does_not_change_what_is_judged(
+    world: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also in shares: sentences and sums are equal, to the bit, for ticks of one arrival, of 20 ms and of everything."""
+    monkeypatch.setattr(consistency, "SHARE", 8)
+    monkeypatch.setattr(consistency, "TRACKS_AT_LEAST", 2)
+    monkeypatch.setattr(consistency, "MANY", 8)
+    random = np.random.default_rng(1)
+    reports = [
+        world.report(course, 0.5 * k, aircraft=f"mavlink:{number}", off_m=tuple(random.normal(0.0, 60.0, 3)))
+        for number, course in enumerate(world.Course(-9000.0 - 4000.0 * j) for j in range(6))
+        for k in range(40)
+    ]
+    runs = [world.run(reports, ticks=ticks) for ticks in ("one", "20 ms", "all")]
+    assert runs[0].said("scatters")
+    for other in runs[1:]:
+        assert [(one.at, one.text) for one in other.events] == [(one.at, one.text) for one in runs[0].events]
+        assert other.state.consistency.noises == runs[0].state.consistency.noises
+        assert other.state.consistency.sums.tobytes() == runs[0].state.consistency.sums.tobytes()
+
+
 def _known(names: Sequence[str], heard: Sequence[int]) -> Consistency:
     """What is known of the positions of some aircraft that were heard at some times."""
     noises = {(f"GPS of {name}", "position", True): row for row, name in enumerate(names)}
@@ -234,7 +283,7 @@ def _known(names: Sequence[str], heard: Sequence[int]) -> Consistency:
 def test_noises_are_bounded() -> None:
     """Those least lately heard are forgotten."""
     names = [str(number) for number in range(NOISES_AT_MOST + 10)]
-    kept, _ = _known(names, range(len(names))).judged(PositionSource(), {})
+    kept = _known(names, range(len(names))).planning(0)
     assert len(kept.noises) == len(kept.sums) == len(kept.heard) == NOISES_AT_MOST
     assert ("GPS of 9", "position", True) not in kept.noises
     assert kept.noises["GPS of 10", "position", True] == 0
@@ -245,7 +294,7 @@ def test_what_is_kept_of_a_track_is_bounded_and_forgotten(world: Any) -> None:
     known, _ = _judged(world, [_reports(world, 20.0)])
     assert known.reports is not None
     assert len(known.reports.at) == 3
-    later, _ = known.judged(PositionSource(), {}, world.at(60.0))
+    later = known.planning(world.at(60.0))
     assert later.reports is None
 
 
@@ -309,6 +358,6 @@ def test_the_parts_of_a_plot_are_keys_of_the_site_file(world: Any) -> None:
 def test_sources_that_are_gone_for_an_hour_are_forgotten() -> None:
     """What is known of a source stays while it is heard, and an hour longer."""
     hour = 3600 * SECOND
-    kept, _ = _known("ab", [0, hour]).judged(PositionSource(), {}, hour + 5 * SECOND)
+    kept = _known("ab", [0, hour]).planning(hour + 5 * SECOND)
     assert list(kept.noises) == [("GPS of b", "position", True)]
     assert kept.heard.tolist() == [hour]
