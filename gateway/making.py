@@ -33,7 +33,7 @@ class Making:
         self.now, self.instant, self.serial = state.now, state.instant, state.serial
         self.counters, self.said, self.reported = dict(state.counters), state.said, state.reported
         self.consistency, self.predicting = state.consistency, state.predicting
-        self.unnumbered = state.unnumbered
+        self.unnumbered, self.probing = state.unnumbered, state.probing
         self.history = int(state.options.history_s * SECOND)
         self.wait = int(state.options.association_wait_s * SECOND)
         self.events: list[Event] = []
@@ -49,6 +49,7 @@ class Making:
         self.settled: list[Settled] = []
         self.residuals: list[Residuals] = []
         self.forecasts: list[predict.Forecast] = []
+        self.rounds: list[predict.Round] = []
         self.jobs: dict[int, Job] = {}
         self._both: tuple[Spans, tuple[Adopted, ...], tuple[Joint, ...], Spans] = (Spans(), (), (), Spans())
         self.untracked = 0
@@ -133,6 +134,7 @@ class Making:
             self.consistency,
             self.predicting,
             self.unnumbered,
+            self.probing,
         )
         observations = tuple(observation for arrival in self.heard for observation in arrival.observations)
         own = SourceHealth("gateway", "pipeline", 0.0, 0.0, 0, tuple(sorted(self.counters.items())))
@@ -146,7 +148,7 @@ class Making:
             associate=associate.table(self.checks, self.association.ledger, self.changes, self.of_radars),
             register=register.table(self.registration, self.radars, self.now or 0, self.residuals),
             fuse=replace(table, settled=tuple(self.settled)),
-            predict=predict.table(self.forecasts, self.frame),
+            predict=predict.table(self.forecasts, self.frame, self.rounds),
             truth=tuple(observation for observation in observations if isinstance(observation, Truth)),
             health=replace(health, sources=(*health.sources, own)),
             events=tuple(self.events),

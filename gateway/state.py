@@ -10,7 +10,7 @@ from gateway.associate import Association, Change
 from gateway.frames import RunwayFrame
 from gateway.fuse import Lanes
 from gateway.fuse.consistency import Consistency
-from gateway.predict import Predicting
+from gateway.predict import Predicting, Probing
 from gateway.register import Registration, Remembered
 from gateway.settings import Options, RadarSite, Site
 from gateway.track import RadarTracks, Unnumbered
@@ -39,6 +39,7 @@ class State:
     consistency: Consistency = Consistency()  # whether sources scatter as much as the settings say
     predicting: Predicting = Predicting()  # what aircraft say of their plans, and what is thought of each
     unnumbered: Unnumbered = Unnumbered()  # plots without a number, and what they are thought to be
+    probing: Probing = Probing()  # which tracks are foretold to come near each other
 
     def to_remember(self, at: int) -> Remembered | None:
         """What is known of the radars' errors, for the next session of this site; None where nothing is."""

@@ -6,6 +6,7 @@ ends what joined; `placing` puts measurements into them, late ones where they be
 tracks at once; `weighting` holds the four ways to weigh a position source against a radar; `rows` makes the result.
 """
 
+from gateway.fuse.agreement import CONFIRMED
 from gateway.fuse.becoming import joined
 from gateway.fuse.continuing import adopted_earlier, continued, reviewed, spans_with, taken_on
 from gateway.fuse.joints import Regrouped, radar_tracks_of_aircraft, regrouped, remembered
@@ -16,6 +17,7 @@ from gateway.fuse.rows import Fused, Row, coast, knows_height, table, work
 from gateway.fuse.settled import Settled, remaining, settled
 
 __all__ = [
+    "CONFIRMED",
     "Adopted",
     "Ended",
     "Fused",

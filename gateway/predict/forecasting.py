@@ -29,6 +29,7 @@ from gateway.predict.spread import (
 from gateway.predict.states import State
 from gateway.predict.table import Forecast
 from gateway.predict.thinking import motions
+from gateway.predict.ways import ways_of
 from gateway.settings import Site
 
 Floats = NDArray[np.float64]
@@ -75,6 +76,8 @@ def forecast(
     sigma = spread(now, whole, horizons, state.place_sigma, _rests(way, whole), way.confidence)
     up = heights(state.up, state.climb, now, ahead, way.up, way.lands, way.route, horizons)
     mean = np.concatenate([ahead.position, up[..., None]], axis=2)
+    known_s, reported = around - state.since_s[:, None], np.array([lane.aircraft is not None for lane in lanes])
+    ways = ways_of([lane.number for lane in lanes], at, state, whole, known_s, up, sigma, horizons_s, reported)
     told_names = [one.names[best] if best >= 0 else None for one, best in zip(goals, way.best.tolist(), strict=True)]
     made = Forecast(
         at,
@@ -89,6 +92,7 @@ def forecast(
         tuple(told_names),
         way.kind,
         way.confidence,
+        ways,
     )
     return replace(predicting, remembered=predicting.remembered.after(tracks, minds)), made
 

@@ -28,6 +28,8 @@ class State:
     speed: Floats
     up: Floats  # (n,) then
     climb: Floats
+    up_sigma: Floats  # of where it is as its position source will say it, like `place_sigma`
+    climb_sigma: Floats
     place_sigma: Floats  # (n,)
     velocity_sigma: Floats
     sides: Floats  # (n, 3)
@@ -54,15 +56,17 @@ class State:
             np.sqrt(velocity[:, 0] * velocity[:, 0] + velocity[:, 1] * velocity[:, 1]),
             mean[:, 2],
             mean[:, 5],
-            _reported_sigma(covariance),
+            _reported_sigma(covariance, (2,)),
+            np.sqrt(variance[:, 5]),
+            _reported_sigma(covariance, (0, 1)),
             np.sqrt(0.5 * (variance[:, 3] + variance[:, 4])),
             sides,
             knows_height(events, [at] * len(events), covariance),
         )
 
 
-def _reported_sigma(covariance: Floats) -> Floats:
+def _reported_sigma(covariance: Floats, of_axes: Sequence[int]) -> Floats:
     """Sigma (n,) an axis of where a track is as its position source will say it: the source's own error stays the same."""
-    axes = np.arange(2)
+    axes = np.array(of_axes)
     error = 2.0 * covariance[:, axes, axes + 6] + covariance[:, axes + 6, axes + 6]
     return np.asarray(np.sqrt(np.maximum((covariance[:, axes, axes] + error).mean(axis=1), 0.0)))

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND
 from gateway.frames import RunwayFrame, turn
+from gateway.predict import conflicts
+from gateway.predict.conflicts import NONE_FOUND, Conflicts
+from gateway.predict.ways import Ways
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -42,6 +45,7 @@ class Predicted:
     sigma_along_m: Floats  # along the course that is foretold, and across it
     sigma_across_m: Floats
     course_rad: Floats  # compass course there
+    conflicts: Conflicts = NONE_FOUND
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,10 +64,11 @@ class Forecast:
     intent: tuple[str | None, ...]  # (t)
     kind: Ints  # (t,) 0 none, 1 inferred, 2 declared
     confidence: Floats  # (t,)
+    ways: Ways
 
 
-def table(forecasts: Sequence[Forecast], frame: RunwayFrame) -> Predicted:
-    """Forecasts as columns in geodetic coordinates."""
+def table(forecasts: Sequence[Forecast], frame: RunwayFrame, rounds: Sequence[conflicts.Round] = ()) -> Predicted:
+    """Forecasts, and rounds of the conflict probe, as columns in geodetic coordinates."""
     each = [len(f.horizons_s) for f in forecasts]
     made_at = _joined([np.full(f.course.size, f.made, dtype=np.int64) for f in forecasts], np.int64)
     horizon_s = _joined([np.tile(np.array(f.horizons_s), len(f.tracks)) for f in forecasts])
@@ -90,6 +95,7 @@ def table(forecasts: Sequence[Forecast], frame: RunwayFrame) -> Predicted:
         sigma_along_m=along,
         sigma_across_m=across,
         course_rad=np.remainder(0.5 * math.pi - _joined([f.course for f in forecasts]), 2.0 * math.pi),
+        conflicts=conflicts.table(rounds, frame) if rounds else NONE_FOUND,
     )
 
 

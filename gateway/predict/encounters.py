@@ -1,0 +1,245 @@
+"""Encounters: of many ways, the pairs that come near each other, when, where, how near, and how probably.
+
+Neighbours are found by a grid in space at each time, so that a crowd costs what its neighbours cost and not its square.
+
+Source: the probability is that of Paielli and Erzberger, Conflict probability estimation for free flight (1997): both errors
+as one of the relative place, and the chance that a straight relative way leads through the protected circle. Deviation: the
+chance is that of a strip as wide as the circle, bounded along the way by the time that is looked at.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.align import SECOND
+from gateway.predict.ways import STEP_S, Ways, at_instant, sigmas_at
+from gateway.settings import Separation
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+WIDER = 1.25  # than the separation: pairs this near are told too, so that who watches them need not waver
+SAME_M, SAME_MPS = 800.0, 25.0  # what a radar sees beside an aircraft, as fast as it, may be that aircraft
+FASTEST_MPS = 350.0
+EARTH_M = 6.37e6
+_BUCKETS = 1 << 16
+_AROUND = ((0, 0), (0, 1), (1, -1), (1, 0), (1, 1))  # each pair of neighbouring cells once
+_WITHIN = np.linspace(-0.5, 0.5, 5) * STEP_S  # about a time of the grid
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Encounters:
+    """k pairs of tracks, by their numbers; the first of each pair is the smaller."""
+
+    pair: Ints  # (k, 2)
+    closest_at: Ints  # (k,) ns, when they are nearest, each distance measured by its separation
+    loses_at: Ints  # (k,) when the separation is lost first; as `closest_at` where it is not
+    ratio: Floats  # (k,) the greater of both distances over their separations, then; below 1 = a conflict
+    horizontal_m: Floats
+    vertical_m: Floats  # NaN where a height is not known: such a pair is taken to be on one level
+    probability: Floats
+    places: Floats  # (k, 2, 3) ENU, of both then
+
+    def where(self, wanted: Bools | Ints) -> Encounters:
+        """Some of the pairs."""
+        return Encounters(*(getattr(self, one.name)[wanted] for one in fields(self)))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Encounters]) -> Encounters:
+        """Some encounters behind others."""
+        time, real = np.zeros(0, dtype=np.int64), np.zeros(0)
+        none = cls(np.zeros((0, 2), dtype=np.int64), time, time, real, real, real, real, np.zeros((0, 2, 3)))
+        return cls(*(np.concatenate([getattr(part, one.name) for part in (none, *parts)]) for one in fields(cls)))
+
+
+def encounters(ways: Ways, at: int, separation: Separation) -> Encounters:
+    """The pairs that come nearer than 1.25 separations within the time that is looked ahead from an instant."""
+    times_s = np.arange(0.0, separation.look_ahead_s + 1e-9, STEP_S)
+    place = _level(at_instant(ways, at, times_s), ways.has_height, separation.least_height_m)
+    velocity = np.nan_to_num(np.gradient(place, STEP_S, axis=1))
+    fastest = math.sqrt((velocity[..., 0] ** 2 + velocity[..., 1] ** 2).max(initial=0.0))
+    reach_m = WIDER * separation.horizontal_m + STEP_S * min(fastest, FASTEST_MPS)
+    hits = neighbours(place[..., :2], reach_m)
+    met = _met(ways, place, velocity, times_s, hits, separation)
+    return _told(ways, at, met, place, velocity, times_s, separation)
+
+
+def _level(place: Floats, has_height: Bools, least_height_m: float) -> Floats:
+    """Places with heights above the curved ground; NaN where nobody is probed. Who has no height may be at any."""
+    up = place[..., 2] + (place[..., 0] ** 2 + place[..., 1] ** 2) / (2.0 * EARTH_M)
+    flies = (up >= least_height_m) | ~has_height[:, None]
+    return np.where(flies[..., None], np.stack([place[..., 0], place[..., 1], up], axis=-1), np.nan)
+
+
+def neighbours(place: Floats, reach_m: float) -> tuple[Ints, Ints, Ints]:
+    """Rows (k,), rows (k,) and times (k,) of n points at m times (n, m, 2) that are within reach of each other; NaN = nowhere.
+
+    Points are sorted into cells as wide as the reach and compared with those of their own and the neighbouring cells only.
+    """
+    n = len(place)
+    there = np.flatnonzero(~np.isnan(place[..., 0]).T.reshape(-1))
+    east, north = (place[..., axis].T.reshape(-1)[there] for axis in (0, 1))
+    time, row = there // max(n, 1), there % max(n, 1)
+    cell_x, cell_y = np.floor(east / reach_m).astype(np.int64), np.floor(north / reach_m).astype(np.int64)
+
+    def bucket(x: Ints, y: Ints) -> NDArray[np.uint16]:
+        return ((time * 73856093 ^ x * 19349663 ^ y * 83492791) % _BUCKETS).astype(np.uint16)
+
+    own = bucket(cell_x, cell_y)
+    order = np.argsort(own, kind="stable")
+    starts = np.concatenate([[0], np.cumsum(np.bincount(own, minlength=_BUCKETS))])
+    found: list[tuple[Ints, Ints]] = []
+    for step_x, step_y in _AROUND:
+        there_too = bucket(cell_x + step_x, cell_y + step_y).astype(np.int64)
+        first, last = starts[there_too], starts[there_too + 1]
+        counts = last - first
+        one = np.repeat(np.arange(len(own)), counts)
+        other = order[np.arange(len(one)) - np.repeat(np.cumsum(counts) - counts, counts) + np.repeat(first, counts)]
+        d_east, d_north = east[other] - east[one], north[other] - north[one]
+        near = (d_east * d_east + d_north * d_north < reach_m * reach_m) & (time[other] == time[one])
+        near &= (cell_x[other] - cell_x[one] == step_x) & (cell_y[other] - cell_y[one] == step_y)
+        if step_x == step_y == 0:
+            near &= row[one] < row[other]
+        found.append((one[near], other[near]))
+    one, other = (np.concatenate([part[side] for part in found]) for side in (0, 1))
+    return np.minimum(row[one], row[other]), np.maximum(row[one], row[other]), time[one]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Met:
+    """Pairs, k of them: rows, and when they are nearest and lose separation, s from now; distances then."""
+
+    first: Ints
+    second: Ints
+    grid: Ints  # the nearest time of the grid
+    after_s: Floats  # and how long after it
+    loses_s: Floats
+    ratio: Floats
+
+
+def _met(
+    ways: Ways,
+    place: Floats,
+    velocity: Floats,
+    times_s: Floats,
+    hits: tuple[Ints, Ints, Ints],
+    separation: Separation,
+) -> _Met:
+    """Of each pair that is near at some times its nearest instant, between the grid's times straight on."""
+    first, second, grid = hits
+    way = place[second, grid] - place[first, grid]
+    level = ways.has_height[first] & ways.has_height[second]
+    way[:, 2] = np.where(level, way[:, 2], 0.0)
+    drift = velocity[second, grid] - velocity[first, grid]
+    drift[:, 2] = np.where(level, drift[:, 2], 0.0)
+    near = np.abs(way[:, 2]) < WIDER * separation.vertical_m + 0.5 * STEP_S * np.abs(drift[:, 2])
+    near &= ~_same(ways, place, velocity, first, second)
+    first, second, grid = first[near], second[near], grid[near]
+    way, drift = way[near], drift[near]
+    square = drift[:, 0] ** 2 + drift[:, 1] ** 2
+    abeam_s = -(way[:, 0] * drift[:, 0] + way[:, 1] * drift[:, 1]) / np.maximum(square, 1e-9)
+    after_s = np.concatenate(
+        [
+            np.clip(abeam_s, _WITHIN[0], _WITHIN[-1])[:, None],
+            np.broadcast_to(_WITHIN, (len(way), len(_WITHIN))),
+        ],
+        axis=1,
+    )
+    after_s = np.maximum(after_s, -times_s[grid][:, None])
+    then = way[:, None] + after_s[..., None] * drift[:, None]
+    ratio = np.maximum(
+        np.sqrt(then[..., 0] ** 2 + then[..., 1] ** 2) / separation.horizontal_m,
+        np.abs(then[..., 2]) / separation.vertical_m,
+    )
+    best = ratio.argmin(axis=1)
+    rows = np.arange(len(way))
+    lost_s = np.where(ratio < 1.0, times_s[grid][:, None] + after_s, math.inf).min(axis=1, initial=math.inf)
+    return _one_each(_Met(first, second, grid, after_s[rows, best], lost_s, ratio[rows, best]))
+
+
+def _one_each(met: _Met) -> _Met:
+    """The nearest instant of each pair, and the first at which it loses separation; pairs no nearer than wanted are left out."""
+    order = np.lexsort((met.grid, met.ratio, met.second, met.first))
+    first, second = met.first[order], met.second[order]
+    begins = np.flatnonzero(np.append(True, (first[1:] != first[:-1]) | (second[1:] != second[:-1]))[: len(order)])
+    loses_s = np.minimum.reduceat(met.loses_s[order], begins) if len(begins) else met.loses_s
+    one = order[begins]
+    chosen = _Met(*(getattr(met, part.name)[one] for part in fields(met)))
+    near = chosen.ratio < WIDER
+    return _Met(
+        chosen.first[near],
+        chosen.second[near],
+        chosen.grid[near],
+        chosen.after_s[near],
+        loses_s[near],
+        chosen.ratio[near],
+    )
+
+
+def _same(ways: Ways, place: Floats, velocity: Floats, first: Ints, second: Ints) -> Bools:
+    """Which pairs may be one thing, which a radar sees and which speaks of itself, not known to be one yet."""
+    way, drift = place[second, 0] - place[first, 0], velocity[second, 0] - velocity[first, 0]
+    beside = (way[:, 0] ** 2 + way[:, 1] ** 2 < SAME_M**2) & (drift[:, 0] ** 2 + drift[:, 1] ** 2 < SAME_MPS**2)
+    return np.asarray(beside & ~(ways.reported[first] & ways.reported[second]))
+
+
+def _told(
+    ways: Ways, at: int, met: _Met, place: Floats, velocity: Floats, times_s: Floats, separation: Separation
+) -> Encounters:
+    """What is told of each pair."""
+    closest_s = times_s[met.grid] + met.after_s
+    closest_at = at + np.rint(closest_s * SECOND).astype(np.int64)
+    loses_s = np.where(np.isinf(met.loses_s), closest_s, met.loses_s)
+    there = [
+        place[rows, met.grid] + met.after_s[:, None] * velocity[rows, met.grid] for rows in (met.first, met.second)
+    ]
+    way, drift = there[1] - there[0], velocity[met.second, met.grid] - velocity[met.first, met.grid]
+    level = ways.has_height[met.first] & ways.has_height[met.second]
+    one, up_one = sigmas_at(ways, met.first, closest_at)
+    two, up_two = sigmas_at(ways, met.second, closest_at)
+    chance = _chance(way[:, :2], drift[:, :2], one + two, closest_s, separation)
+    above = _normal(way[:, 2], np.sqrt(up_one + up_two), -separation.vertical_m, separation.vertical_m)
+    for side in there:  # back into the frame that is flat
+        side[:, 2] -= (side[:, 0] ** 2 + side[:, 1] ** 2) / (2.0 * EARTH_M)
+    return Encounters(
+        np.stack([ways.track[met.first], ways.track[met.second]], axis=-1),
+        closest_at,
+        at + np.rint(loses_s * SECOND).astype(np.int64),
+        met.ratio,
+        np.sqrt(way[:, 0] ** 2 + way[:, 1] ** 2),
+        np.where(level, np.abs(way[:, 2]), np.nan),
+        chance * np.where(level, above, 1.0),
+        np.stack(there, axis=1),
+    )
+
+
+def _chance(way: Floats, drift: Floats, covariance: Floats, closest_s: Floats, separation: Separation) -> Floats:
+    """How probably (k,) relative ways that lead from (k, 2) on with (k, 2) m/s come within the separation."""
+    speed = np.sqrt(drift[:, 0] ** 2 + drift[:, 1] ** 2)
+    distance = np.sqrt(way[:, 0] ** 2 + way[:, 1] ** 2)
+    slow = speed < 1.0  # then the way to each other is as good a direction as any
+    ahead = np.where(slow[:, None], way / np.maximum(distance, 1e-9)[:, None], drift / np.maximum(speed, 1e-9)[:, None])
+    x, y = ahead[:, 0], ahead[:, 1]
+    xx, xy, yy = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
+    along = np.sqrt(xx * x * x + 2.0 * xy * x * y + yy * y * y)
+    across = np.sqrt(xx * y * y - 2.0 * xy * x * y + yy * x * x)
+    r = separation.horizontal_m
+    passes = _normal(way[:, 1] * x - way[:, 0] * y, across, -r, r)
+    left_s = separation.look_ahead_s - closest_s
+    return passes * _normal(way[:, 0] * x + way[:, 1] * y, along, -r - speed * left_s, r + speed * closest_s)
+
+
+def _normal(mean: Floats, sigma: Floats, low: Floats | float, high: Floats | float) -> Floats:
+    """The probability (k,) that a normal variable is between two bounds."""
+    scale = math.sqrt(2.0) * np.maximum(sigma, 1e-3)
+    return 0.5 * (_erf((high - mean) / scale) - _erf((low - mean) / scale))
+
+
+def _erf(values: Floats) -> Floats:
+    return np.array([math.erf(value) for value in values.tolist()], dtype=np.float64)

@@ -1,0 +1,152 @@
+"""Ways: the predictions of some tracks as paths on one grid of times, with their sigmas, for who compares paths."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.align import SECOND
+from gateway.estimators.two_segment import Ahead
+from gateway.predict.spread import Spread
+from gateway.predict.states import State
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+STEP_S = 5.0  # of the grid
+MOST_TURNED_RAD = 5.0  # between two points of a path; who turns further is drawn through the middle of its circle
+LEVELS_OFF, CLIMBS_MPS = 0.2, 0.3  # a climb may change by this share of it, and who is level may begin to climb
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ways:
+    """n tracks, and g times at a distance of `STEP_S`, the first when they were made."""
+
+    track: Ints  # (n,)
+    made: Ints  # (n,) ns
+    place: Floats  # (n, g, 3) ENU
+    course: Floats  # (n, g) from east to north
+    along: Floats  # (n, g) sigmas of the place, along and across the course, and upright
+    across: Floats
+    upright: Floats
+    has_height: Bools  # (n,)
+    reported: Bools  # (n,) whether an aircraft says where it is; others only a radar sees
+
+    def taken(self, rows: Ints | Bools) -> Ways:
+        """Some of the rows."""
+        return Ways(*(getattr(self, one.name)[rows] for one in fields(self)))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Ways]) -> Ways:
+        """The newest way of each track in any of the parts, in the order of the tracks' numbers; at least one part.
+
+        The grids must be as long as each other.
+        """
+        whole = cls(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(cls)))
+        order = np.lexsort((whole.made, whole.track))
+        newest = np.append(whole.track[order][1:] != whole.track[order][:-1], True)
+        return whole.taken(order[newest[: len(order)]])
+
+
+def ways_of(
+    tracks: Sequence[int],
+    made: int,
+    state: State,
+    whole: Ahead,
+    known_s: Floats,
+    up: Floats,
+    spread: Spread,
+    horizons_s: Sequence[float],
+    reported: Bools,
+) -> Ways:
+    """The ways of n tracks that were foretold at an instant.
+
+    `whole` are their paths at times `known_s` (n, k) after it, one of them not later than it; `up` (n, h) and `spread` what is
+    foretold at the horizons.
+    """
+    times = grid_s(horizons_s)
+    level, course = path_on(times, known_s, whole.position, whole.course)
+    known = np.concatenate([[0.0], horizons_s])
+    up_now = state.up + state.climb * state.since_s
+    height = between(times, known, np.concatenate([up_now[:, None], up], axis=1))
+    along, across = (
+        between(times, known, np.concatenate([state.place_sigma[:, None], sigma], axis=1))
+        for sigma in (spread.along, spread.across)
+    )
+    wanders = state.climb_sigma**2 + (LEVELS_OFF * state.climb) ** 2 + CLIMBS_MPS**2
+    upright = np.sqrt(state.up_sigma[:, None] ** 2 + wanders[:, None] * times * times)
+    place = np.concatenate([level, height[..., None]], axis=2)
+    at = np.full(len(tracks), made, dtype=np.int64)
+    return Ways(np.array(tracks, dtype=np.int64), at, place, course, along, across, upright, state.has_height, reported)
+
+
+def grid_s(horizons_s: Sequence[float]) -> Floats:
+    """The times of the grid (g,) of predictions at these horizons, s after they were made."""
+    return np.arange(0.0, max(horizons_s) + 1e-9, STEP_S)
+
+
+def path_on(times_s: Floats, known_s: Floats, place: Floats, course: Floats) -> tuple[Floats, Floats]:
+    """Places (n, g, 2) and courses (n, g) of n paths at times (g,), of places (n, k, 2) and courses (n, k) at `known_s` (n, k).
+
+    A cubic through two places with their courses, as long as an arc from one to the other; the courses are not wrapped.
+    """
+    order = np.argsort(known_s, axis=1, kind="stable")
+    known = np.take_along_axis(known_s, order, axis=1)
+    first = np.clip((known[:, :, None] <= times_s).sum(axis=1) - 1, 0, known.shape[1] - 2)
+
+    def ends(values: Floats) -> tuple[Floats, Floats]:
+        ordered = np.take_along_axis(values, order, axis=1)
+        return np.take_along_axis(ordered, first, axis=1), np.take_along_axis(ordered, first + 1, axis=1)
+
+    (before_s, after_s), (east, next_east), (north, next_north), (heading, next_heading) = map(
+        ends, (known_s, place[..., 0], place[..., 1], course)
+    )
+    share = np.clip((times_s - before_s) / np.maximum(after_s - before_s, 1e-9), 0.0, 1.0)
+    half = 0.5 * np.clip(np.abs(next_heading - heading), 1e-6, MOST_TURNED_RAD)
+    d_east, d_north = next_east - east, next_north - north
+    length = np.sqrt(d_east * d_east + d_north * d_north) * half / np.sin(np.minimum(half, 2.5))
+    rest = 1.0 - share
+    leaves, arrives = length * share * rest * rest, -length * share * share * rest
+    middle = share * share * (3.0 - 2.0 * share)
+    east = east + middle * d_east + leaves * np.cos(heading) + arrives * np.cos(next_heading)
+    north = north + middle * d_north + leaves * np.sin(heading) + arrives * np.sin(next_heading)
+    return np.stack([east, north], axis=-1), heading + share * (next_heading - heading)
+
+
+def between(times_s: Floats, known_s: Floats, values: Floats) -> Floats:
+    """Values (n, g) at times (g,), straight between those (n, k) at `known_s` (k,), which ascend."""
+    first = np.clip(np.searchsorted(known_s, times_s, side="right") - 1, 0, len(known_s) - 2)
+    share = np.clip((times_s - known_s[first]) / (known_s[first + 1] - known_s[first]), 0.0, 1.0)
+    return np.asarray(values[:, first] * (1.0 - share) + values[:, first + 1] * share)
+
+
+def at_instant(ways: Ways, at: int, times_s: Floats) -> Floats:
+    """Places (n, m, 3) at times (m,) after an instant, straight between those of the grid; NaN beyond it."""
+    last = ways.place.shape[1] - 1
+    grid = (((at - ways.made) / SECOND)[:, None] + times_s) / STEP_S
+    first = np.clip(np.floor(grid), 0, last - 1).astype(np.int64)
+    share = (grid - first)[..., None]
+    one, two = (np.take_along_axis(ways.place, place[..., None], axis=1) for place in (first, first + 1))
+    beyond = (grid > last + 1e-9) | (grid < -1e-9)
+    return np.where(beyond[..., None], np.nan, one * (1.0 - share) + two * share)
+
+
+def sigmas_at(ways: Ways, rows: Ints, at: Ints) -> tuple[Floats, Floats]:
+    """Covariances (k, 2, 2) and upright variances (k,) of some rows (k,) at instants (k,) ns, by the nearest of the grid."""
+    last = ways.place.shape[1] - 1
+    near = np.clip(np.rint((at - ways.made[rows]) / (STEP_S * SECOND)), 0, last).astype(np.int64)
+    along, across, course = (column[rows, near] for column in (ways.along, ways.across, ways.course))
+    cosine, sine = np.cos(course), np.sin(course)
+    first, second = along * along, across * across
+    mixed = (first - second) * sine * cosine
+    level = [
+        first * cosine * cosine + second * sine * sine,
+        mixed,
+        mixed,
+        first * sine * sine + second * cosine * cosine,
+    ]
+    return np.stack(level, axis=-1).reshape(-1, 2, 2), ways.upright[rows, near] ** 2
