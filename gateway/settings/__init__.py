@@ -8,6 +8,7 @@ from gateway.settings.reading import SiteError, parse_site
 from gateway.settings.safety import Separation, Stabilised
 from gateway.settings.site import (
     DEMO_SITE,
+    DeadReckoning,
     DecisionPoint,
     Estimation,
     PositionSource,
@@ -24,6 +25,7 @@ from gateway.settings.writing import format_site
 __all__ = [
     "DEMO_SITE",
     "AssociationRule",
+    "DeadReckoning",
     "DecisionPoint",
     "Estimation",
     "EstimatorName",

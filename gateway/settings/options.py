@@ -9,6 +9,7 @@ Weighting = Literal["bias", "covariance", "innovation", "literal"]
 EstimatorName = Literal["kalman", "imm", "rmimm", "alpha-beta-gamma"]
 AssociationRule = Literal["default", "literal"]
 Registering = Literal["apply", "watch", "off"]
+Reckoning = Literal["on", "off"]
 MutedSource = Literal["gps", "radar"]
 
 
@@ -36,6 +37,7 @@ class Options:
     weighting: Weighting = "bias"
     association: AssociationRule = "default"
     registration: Registering = "apply"  # what radars measure too much: learnt and taken off, only told, or neither
+    dead_reckoning: Reckoning = "on"  # by what vehicles tell of their own motion, where their positions fail
     acceleration_sigma_mps2: float = 2.0  # of the constant-velocity model, east and north
     vertical_acceleration_sigma_mps2: float = 1.0  # aircraft change their climb less than their course
     acceleration_time_s: float = 0.4  # white over this time: sigma^2 x time is the density, whatever the step

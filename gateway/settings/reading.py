@@ -10,7 +10,17 @@ from dataclasses import dataclass
 from typing import Any
 
 from gateway.settings.safety import Separation, Stabilised
-from gateway.settings.site import DecisionPoint, Estimation, PositionSource, RadarSite, Runway, Site, Waypoint, Weather
+from gateway.settings.site import (
+    DeadReckoning,
+    DecisionPoint,
+    Estimation,
+    PositionSource,
+    RadarSite,
+    Runway,
+    Site,
+    Waypoint,
+    Weather,
+)
 
 
 class SiteError(ValueError):
@@ -49,6 +59,12 @@ def _text(*allowed: str) -> Convert:
         return value
 
     return convert
+
+
+def _flag(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError(f"must be true or false, not {value!r}")
+    return value
 
 
 def _polygon(value: Any) -> tuple[tuple[float, float], ...]:
@@ -148,6 +164,25 @@ _TABLES: dict[str, _Table] = {
             "speed_share": ("speed_share", _number(0.01, 10.0)),
         }
     ),
+    "dead_reckoning": _Table(
+        {
+            "gyro_noise_degps": ("gyro_noise", _number(1e-5, 10.0, scale=_RAD)),
+            "gyro_bias_degps": ("gyro_bias_radps", _number(1e-5, 10.0, scale=_RAD)),
+            "gyro_bias_wanders_degps": ("gyro_bias_wanders", _number(0.0, 1.0, scale=_RAD)),
+            "accelerometer_noise_mps2": ("accelerometer_noise", _number(1e-5, 10.0)),
+            "accelerometer_bias_mps2": ("accelerometer_bias_mps2", _number(1e-5, 10.0)),
+            "accelerometer_bias_wanders_mps2": ("accelerometer_bias_wanders", _number(0.0, 1.0)),
+            "attitude_sigma_deg": ("attitude_sigma_rad", _number(0.01, 45.0, scale=_RAD)),
+            "airspeed_sigma_mps": ("airspeed_sigma_mps", _number(0.01, 100.0)),
+            "sideslip_sigma_mps": ("sideslip_sigma_mps", _number(0.01, 100.0)),
+            "wind_mps": ("wind_mps", _number(0.1, 100.0)),
+            "wind_wanders_mps": ("wind_wanders", _number(0.0, 10.0)),
+            "slip_mps": ("slip_mps", _number(0.001, 10.0)),
+            "altitude_sigma_m": ("altitude_sigma_m", _number(0.1, 1000.0)),
+            "ends_at_sigma_m": ("ends_at_sigma_m", _number(1.0, 1e5)),
+            "refuses": ("refuses", _flag),
+        }
+    ),
     "radar": _Table(
         {
             "number": ("number", _whole(1, 65535)),
@@ -242,6 +277,7 @@ def parse_site(text: str, name: str = "site file") -> Site:
         runway=runway,
         position=PositionSource(**(rows("position") or [{}])[0]),
         estimation=Estimation(**(rows("estimation") or [{}])[0]),
+        dead_reckoning=DeadReckoning(**(rows("dead_reckoning") or [{}])[0]),
         separation=Separation(**(rows("separation") or [{}])[0]),
         stabilised=Stabilised(**(rows("stabilised") or [{}])[0]),
         radars=radars,

@@ -104,6 +104,30 @@ class Estimation:
 
 
 @dataclass(frozen=True, slots=True)
+class DeadReckoning:
+    """How good vehicles' inertial units are, and what else ties dead reckoning; noises in a root Hz, wandering in a root s.
+
+    The defaults are those of a small autopilot in the air, vibration included.
+    """
+
+    gyro_noise: float = math.radians(0.03)  # rad/s
+    gyro_bias_radps: float = math.radians(0.3)
+    gyro_bias_wanders: float = 1e-5  # rad/s
+    accelerometer_noise: float = 0.05  # m/s2
+    accelerometer_bias_mps2: float = 0.2
+    accelerometer_bias_wanders: float = 1e-3  # m/s2
+    attitude_sigma_rad: float = math.radians(1.0)  # of an autopilot's roll and pitch; its heading is twice as bad
+    airspeed_sigma_mps: float = 0.7
+    sideslip_sigma_mps: float = 1.0
+    wind_mps: float = 10.0  # before anything is known of it
+    wind_wanders: float = 0.15  # m/s
+    slip_mps: float = 0.2  # of wheels to the side
+    altitude_sigma_m: float = 5.0  # of altitudes that are told beside positions
+    ends_at_sigma_m: float = 300.0  # less sure than this it tells nothing
+    refuses: bool = True  # positions that it denies
+
+
+@dataclass(frozen=True, slots=True)
 class DecisionPoint:
     """A named point on the approach, before the threshold."""
 
@@ -147,6 +171,7 @@ class Site:
     estimation: Estimation = Estimation()
     separation: Separation = Separation()
     stabilised: Stabilised = Stabilised()
+    dead_reckoning: DeadReckoning = DeadReckoning()
     radars: tuple[RadarSite, ...] = ()
     decision_points: tuple[DecisionPoint, ...] = ()
     waypoints: tuple[Waypoint, ...] = ()

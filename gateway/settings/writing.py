@@ -7,7 +7,16 @@ import math
 from collections.abc import Iterable
 
 from gateway.settings.safety import Separation, Stabilised
-from gateway.settings.site import SLOWEST_MPS, Estimation, PositionSource, RadarSite, Runway, Site, Weather
+from gateway.settings.site import (
+    SLOWEST_MPS,
+    DeadReckoning,
+    Estimation,
+    PositionSource,
+    RadarSite,
+    Runway,
+    Site,
+    Weather,
+)
 
 
 def format_site(site: Site) -> str:
@@ -18,6 +27,7 @@ def format_site(site: Site) -> str:
     lines = [f"name = {_quoted(site.name)}", "", "[display]", f'units = "{site.units}"                # or "aviation"']
     lines += ["", "[runway]", *_runway(site.runway), "", *_position(site.position), "", *_estimation(site.estimation)]
     lines += ["", *_separation(site.separation), "", *_stabilised(site.stabilised)]
+    lines += ["", *_dead_reckoning(site.dead_reckoning)]
     for radar in site.radars:
         lines += ["", "[[radar]]", *_radar(radar)]
     for point in site.decision_points:
@@ -117,6 +127,35 @@ def _stabilised(chosen: Stabilised) -> list[str]:
         for name, value, example, said in given
     )
     return ["[stabilised]                 # an approach that is not is told", *_chosen((*optional, *rows))]
+
+
+def _dead_reckoning(chosen: DeadReckoning) -> list[str]:
+    usual, degree = DeadReckoning(), 180.0 / math.pi
+    said = (
+        ("gyro_noise_degps", "gyro_noise", degree, "in a root Hz, vibration included"),
+        ("gyro_bias_degps", "gyro_bias_radps", degree, "when switched on"),
+        ("gyro_bias_wanders_degps", "gyro_bias_wanders", degree, "in a root second"),
+        ("accelerometer_noise_mps2", "accelerometer_noise", 1.0, "in a root Hz"),
+        ("accelerometer_bias_mps2", "accelerometer_bias_mps2", 1.0, ""),
+        ("accelerometer_bias_wanders_mps2", "accelerometer_bias_wanders", 1.0, "in a root second"),
+        (
+            "attitude_sigma_deg",
+            "attitude_sigma_rad",
+            degree,
+            "of roll and pitch that autopilots tell; heading twice that",
+        ),
+        ("airspeed_sigma_mps", "airspeed_sigma_mps", 1.0, ""),
+        ("sideslip_sigma_mps", "sideslip_sigma_mps", 1.0, ""),
+        ("wind_mps", "wind_mps", 1.0, "before anything is known of it"),
+        ("wind_wanders_mps", "wind_wanders", 1.0, "in a root second"),
+        ("slip_mps", "slip_mps", 1.0, "of wheels to the side"),
+        ("altitude_sigma_m", "altitude_sigma_m", 1.0, "of altitudes that are told beside positions"),
+        ("ends_at_sigma_m", "ends_at_sigma_m", 1.0, "less sure than this it tells nothing"),
+    )
+    rows = ((key, per * getattr(chosen, name), per * getattr(usual, name), says) for key, name, per, says in said)
+    refuses = f"{'# ' if chosen.refuses else ''}refuses = {str(chosen.refuses).lower()}"
+    head = "[dead_reckoning]             # how good vehicles' inertial units are"
+    return [head, *_chosen(rows), f"{refuses:<44s} # positions that inertial data deny"]
 
 
 def _chosen(rows: Iterable[tuple[str, float, float | None, str]]) -> list[str]:
