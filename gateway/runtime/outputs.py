@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,7 @@ from gateway.settings import Site
 from gateway.sinks import Sink
 from gateway.sinks.apart import Apart
 from gateway.sinks.arrow import ArrowSink
-from gateway.sinks.aside import Aside
+from gateway.sinks.aside import Aside, AtOnce, SinkAside, size_of
 from gateway.sinks.parquet import SmoothedTable, finish
 from gateway.sinks.publish import PublishSink
 
@@ -31,20 +32,22 @@ if TYPE_CHECKING:
 RRD_FILE = "session.rrd"
 _WATCHED = (0.4, 256)  # seconds and rows that are drawn at once, for people who look on
 _LIVE = (0.4, 16384)  # the same where drawing has a process of its own and holds up nothing
-_TABLES_WATCHED_S = 1.0  # of rows that a kill may cost
+_TABLES_WATCHED_S, _TABLES_ROWS = 1.0, 400  # of rows that a kill may cost; of many, few at once hold nothing up
 _UNWATCHED = (30.0, 4096)  # where a recording is replayed as fast as it goes: fewer, larger batches cost less
 
 
 class Outputs:
     """The sinks of one session, and the smoothing after it where that is asked for.
 
-    Where somebody looks on, or the session must survive a kill, rows go out in small batches.
+    Where somebody looks on, or the session must survive a kill, rows go out in small batches. What is written to the disk is
+    written `aside`, in the order in which it was given.
     Raises OSError when what must be kept could not be, LinkError when the viewers' port is taken or tracks cannot be
     published where they should be.
     """
 
-    def __init__(self, site: Site, folder: Path | None, setup: Setup) -> None:
+    def __init__(self, site: Site, folder: Path | None, setup: Setup, aside: Aside | AtOnce) -> None:
         self._folder = folder
+        self._aside = aside
         self._sinks: list[Sink] = []
         self._rerun: RerunSink | Apart | None = None
         self._publisher: Publisher | None = None
@@ -54,14 +57,15 @@ class Outputs:
             self._published = PublishSink(
                 self._publisher.send, system=setup.publish_system, leave_out=setup.publish_leave_out
             )
-            self._sinks.append(self._published)
         if folder is not None:
             separation_m = site.runway.geoid_separation_m or 0.0
-            period_s = _TABLES_WATCHED_S if setup.is_watched else _UNWATCHED[0]
-            self._sinks.append(ArrowSink(folder, geoid_separation_m=separation_m, period_s=period_s))
+            often = (_TABLES_WATCHED_S, _TABLES_ROWS) if setup.is_watched else _UNWATCHED
+            self._sinks.append(
+                ArrowSink(folder, geoid_separation_m=separation_m, period_s=often[0], rows_limit=often[1])
+            )
         if folder is not None or setup.serve is not None:
             self._rerun = _rerun(site, folder, setup)
-            self._sinks.append(Aside(self._rerun) if isinstance(self._rerun, Apart) else self._rerun)
+            self._sinks.append(SinkAside(self._rerun) if isinstance(self._rerun, Apart) else self._rerun)
         self._smoothing = Smoothing(site, setup.options, folder) if setup.smooth else None
 
     @property
@@ -95,16 +99,23 @@ class Outputs:
         return self._published is not None and self._published.is_our_own(frame)
 
     def write(self, picture: Picture) -> None:
-        """Hand one picture to every sink."""
-        for sink in self._sinks:
-            sink.write(picture)
+        """Hand one picture to every sink; raises what became of those before."""
+        if self._published is not None:
+            self._published.write(picture)
         if self._smoothing is not None:
             self._smoothing.add(picture)
+        if self._sinks:
+            self._aside.do(partial(self._write, picture), size_of(picture))
+
+    def _write(self, picture: Picture) -> None:
+        for sink in self._sinks:
+            sink.write(picture)
 
     def smooth(self, lanes: Lanes, tell: Callable[[float], None]) -> None:
         """Smooth every track, if that was asked for, from what was written and what the lanes still hold."""
         if self._smoothing is None:
             return
+        self._aside.wait()
         table = SmoothedTable(self._folder) if self._folder is not None else None
 
         def give(rows: Fused, step: NDArray[np.int64]) -> None:
@@ -140,11 +151,13 @@ class Outputs:
         failure: OSError | None = None
         if self._smoothing is not None:
             self._smoothing.close()
-        for sink in self._sinks:
+        for step in (self._aside.wait, *(sink.close for sink in self._sinks)):
             try:
-                sink.close()
+                step()
             except OSError as error:
                 failure = error
+        if self._published is not None:
+            self._published.close()
         if self._publisher is not None:
             self._publisher.close()
         if failure is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from adapters.tlog import TlogWriter, tlog_records
 from gateway.runtime.commands import CommandsWriter
 from gateway.runtime.folder import INPUTS, InputFile, Record, write_record
 from gateway.runtime.wholefile import WholeFile
+from gateway.sinks.aside import Aside, AtOnce
 from gateway.sinks.hold import Hold
 
 _SUFFIXES: dict[Kind, str] = {"mavlink": "tlog", "radar": "pcap", "told": "jsonl"}
@@ -32,7 +34,7 @@ class _File:
         self.count = 0
         self._whole = WholeFile(path)
         self._writer = _WRITERS[kind](self._whole)
-        self.flush, self.close = self._whole.flush, self._whole.close
+        self.close = self._whole.close
 
     def keep(self, arrival: Arrival) -> None:
         self.count += 1
@@ -42,6 +44,10 @@ class _File:
         """What is a record of this file already."""
         self.count += len(records)
         self._whole.write_all(records)
+
+    def flush(self, aside: Aside | AtOnce) -> None:
+        if records := self._whole.taken():
+            aside.do(partial(self._whole.put, records), len(records))
 
 
 class _Input:
@@ -62,10 +68,10 @@ class _Input:
             self._refused = _File(self._folder / self._refused_name, self.described.kind)
         self._refused.keep(arrival)
 
-    def flush(self) -> InputFile:
-        self.kept.flush()
+    def flush(self, aside: Aside | AtOnce) -> InputFile:
+        self.kept.flush(aside)
         if self._refused is not None:
-            self._refused.flush()
+            self._refused.flush(aside)
         refused = 0 if self._refused is None else self._refused.count
         return replace(self.described, arrivals=self.kept.count, refused=refused)
 
@@ -78,11 +84,15 @@ class _Input:
 
 
 class Recorder:
-    """Writes one session's folder, which exists and is its own. Every method raises OSError when the disk refuses."""
+    """Writes one session's folder, which exists and is its own. Every method raises OSError when the disk refuses.
 
-    def __init__(self, folder: Path, record: Record) -> None:
+    What a flush writes is written `aside`: whoever waits for the disk is not who receives.
+    """
+
+    def __init__(self, folder: Path, record: Record, aside: Aside | AtOnce | None = None) -> None:
         self.folder = folder
         self.record = record
+        self._aside = aside or AtOnce()
         self._inputs: dict[int, _Input] = {}
         self._hold = Hold(folder)
         write_record(folder, record)
@@ -121,20 +131,20 @@ class Recorder:
     def flush_inputs(self) -> None:
         """Hand the inputs to the operating system: before what came of them, so that a killed session can be replayed."""
         for recorded in self._inputs.values():
-            recorded.flush()
+            recorded.flush(self._aside)
 
     def flush(self, watermark: int, counters: Mapping[str, int]) -> None:
         """Hand everything to the operating system; session.json then says how far it goes."""
-        sources = tuple(self._inputs[number].flush() for number in sorted(self._inputs))
+        sources = tuple(self._inputs[number].flush(self._aside) for number in sorted(self._inputs))
         self.record = replace(self.record, sources=sources, watermark=watermark, counters=dict(counters))
-        write_record(self.folder, self.record)
+        self._aside.do(partial(write_record, self.folder, self.record))
 
     def close(self) -> None:
         """Close the inputs, all of them, whatever one of them says, and let go of the folder."""
         failure: OSError | None = None
-        for recorded in self._inputs.values():
+        for step in (self._aside.wait, *(recorded.close for recorded in self._inputs.values())):
             try:
-                recorded.close()
+                step()
             except OSError as error:
                 failure = error
         self._hold.release()
@@ -145,6 +155,8 @@ class Recorder:
         """Save what the disk still takes after it refused something, and let go of the folder."""
         with contextlib.suppress(OSError):
             self.flush(self.record.watermark or self.record.started_at, self.record.counters)
+        with contextlib.suppress(OSError):
+            self._aside.wait()
         with contextlib.suppress(OSError):
             write_record(self.folder, replace(self.record, ended=ended))
         with contextlib.suppress(OSError):

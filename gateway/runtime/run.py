@@ -30,6 +30,7 @@ from gateway.runtime.places import PlaceFinder
 from gateway.runtime.recorder import Recorder
 from gateway.runtime.setup import Place, RunFailure, Setup
 from gateway.runtime.summary import Summary, Tally
+from gateway.sinks.aside import Aside, AtOnce
 
 _FLUSH_NS = 500_000_000  # of wall time: half of the second that a kill may cost
 
@@ -58,6 +59,8 @@ class Run:
         begins_at = setup.options.begins_at
         self._opening = None if begins_at is None else Opening(begins_at)
         self._muting = Muting(setup.options.mutes)
+        # What waits for the disk must not hold up what comes in; a replay has nothing that could wait for it.
+        self._aside = Aside("archive") if setup.live and setup.archive is not None else AtOnce()
         self._recorder: Recorder | None = None
         self._link_counters: dict[str, int] = {}
         if setup.archive is not None:
@@ -80,7 +83,7 @@ class Run:
     def _record_into(self, folder: Path) -> Recorder:
         record = Record(__version__, self.setup.command, self.setup.options, self.started_at)
         try:
-            return Recorder(folder, record)
+            return Recorder(folder, record, self._aside)
         except OSError as error:
             raise self._failure(error) from error
 
@@ -93,7 +96,7 @@ class Run:
         if self._recorder is not None:
             self._recorder.describe(site=place.text, site_origin=place.origin, registration=remembered)
         try:
-            self.outputs = Outputs(place.site, self.folder, self.setup)
+            self.outputs = Outputs(place.site, self.folder, self.setup, self._aside)
         except OSError as error:
             raise self._failure(error) from error
 
@@ -257,6 +260,7 @@ class Run:
                 self._recorder.describe(ended=ended, summary=summary.document())
                 self._recorder.flush(self._watermark, self._counters())
                 self._recorder.close()
+            self._aside.close()
         except OSError as error:
             raise self._failure(error) from error
         return summary
@@ -269,6 +273,8 @@ class Run:
         if self._recorder is not None:
             self._recorder.describe(watermark=self._watermark)
             self._recorder.abandon(ended)
+        with contextlib.suppress(OSError):
+            self._aside.close()
 
     def _summary(self, ended: str) -> Summary:
         tally = self._tally

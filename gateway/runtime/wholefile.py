@@ -35,7 +35,15 @@ class WholeFile:
 
         Raises OSError when it does not fit; then the file holds the records that did.
         """
+        self.put(self.taken())
+
+    def taken(self) -> list[bytes]:
+        """The records that wait; they are the caller's now, to be `put`, if in another thread, one after the other."""
         records, self._pending = self._pending, []
+        return records
+
+    def put(self, records: list[bytes]) -> None:
+        """Hand some records to the operating system; raises as `flush` does."""
         waiting, written = memoryview(b"".join(records)), 0
         try:
             while written < len(waiting):

@@ -1,5 +1,6 @@
 """What is recorded is read back byte for byte, whatever kind of source it came from."""
 
+import threading
 from collections import Counter
 from itertools import pairwise
 from pathlib import Path
@@ -12,6 +13,7 @@ from gateway.runtime.folder import INPUTS, Record, read_record
 from gateway.runtime.inputs import SessionInput
 from gateway.runtime.recorder import Recorder
 from gateway.settings import Options
+from gateway.sinks.aside import Aside
 
 T0 = 1_767_225_600_000_004_000
 ENCODER = FrameEncoder(1)
@@ -56,6 +58,26 @@ def test_every_kind_of_source_is_read_back_as_it_was(recorder: Recorder) -> None
     recorder.close()
     for source, suffix in zip(SOURCES, ("tlog", "pcap", "jsonl"), strict=True):
         assert read_back(recorder, source, suffix) == given[source.number]
+
+
+def test_recorded_aside_it_is_the_same_and_in_its_order(tmp_path: Path) -> None:
+    """While the disk takes nothing a flush waits for nobody; what is written then is what was given, session.json last."""
+    (tmp_path / INPUTS).mkdir()
+    aside, disk = Aside("archive"), threading.Event()
+    recorder = Recorder(tmp_path, Record("0", (), Options(), T0), aside)
+    recorder.add(SOURCES[0])
+    aside.do(disk.wait)
+    given = [Arrival(T0 + n * 4000, 0, frame) for n, frame in enumerate(FRAMES)]
+    for arrival in given:
+        recorder.keep(arrival)
+        recorder.flush_inputs()
+    recorder.flush(given[-1].received_at, {"lost": 3})
+    assert read_record(tmp_path).sources == ()
+    disk.set()
+    recorder.close()
+    assert [row.arrivals for row in read_record(tmp_path).sources] == [len(given)]
+    assert read_back(recorder, SOURCES[0], "tlog") == given
+    aside.close()
 
 
 def test_what_was_refused_lies_beside_it_and_is_counted_apart(recorder: Recorder) -> None:

@@ -10,7 +10,7 @@ import pytest
 from gateway.picture import Picture
 from gateway.pipeline import initial, step
 from gateway.settings import DEMO_SITE
-from gateway.sinks.aside import Aside
+from gateway.sinks.aside import Aside, AtOnce, SinkAside
 
 
 def _pictures(count: int) -> list[Picture]:
@@ -49,7 +49,7 @@ class _Slow:
 def test_everything_arrives_in_order_and_nobody_waits() -> None:
     """While the other sink stands still pictures are taken all the same; at the end it has every one, in their order."""
     slow = _Slow()
-    aside = Aside(slow)
+    aside = SinkAside(slow)
     for picture in _pictures(50):
         aside.write(picture)
     assert slow.taken == []
@@ -63,7 +63,7 @@ def test_everything_arrives_in_order_and_nobody_waits() -> None:
 def test_so_much_waits_and_no_more() -> None:
     """Whoever writes more than may wait is held up until the other sink has gone on; nothing is dropped."""
     slow = _Slow()
-    aside, pictures = Aside(slow, most=3), _pictures(10)
+    aside, pictures = SinkAside(slow, most=3), _pictures(10)
     written = threading.Event()
 
     def write_all() -> None:
@@ -83,7 +83,7 @@ def test_so_much_waits_and_no_more() -> None:
 def test_what_the_other_sink_raises_is_raised_here_once() -> None:
     """A full disk is told by the next write, or by the end, and after it the other sink is closed."""
     slow = _Slow(refused=2)
-    aside, pictures = Aside(slow), _pictures(5)
+    aside, pictures = SinkAside(slow), _pictures(5)
     for picture in pictures[:3]:
         aside.write(picture)
     slow.let.set()
@@ -97,7 +97,7 @@ def test_what_the_other_sink_raises_is_raised_here_once() -> None:
 def test_a_write_after_a_failure_tells_it() -> None:
     """Who goes on writing is told before long, and what comes later is not taken."""
     slow = _Slow(refused=0)
-    aside, pictures = Aside(slow), _pictures(3)
+    aside, pictures = SinkAside(slow), _pictures(3)
     aside.write(pictures[0])
     slow.let.set()
 
@@ -110,3 +110,36 @@ def test_a_write_after_a_failure_tells_it() -> None:
         go_on()
     aside.close()
     assert slow.taken == []
+
+
+def test_jobs_behind_one_that_fails_are_done_all_the_same() -> None:
+    """What the first one raised is told once, by whoever waits; after the end a job is done at once."""
+    aside, done, let = Aside("jobs"), list[int](), threading.Event()
+
+    def refuse() -> None:
+        let.wait()
+        raise OSError(28, "no space left")
+
+    aside.do(refuse)
+    aside.do(lambda: done.append(1))
+    let.set()
+    with pytest.raises(OSError, match="no space left"):
+        aside.wait()
+    aside.do(lambda: done.append(2))
+    aside.wait()
+    assert done == [1, 2]
+    aside.close()
+    aside.do(lambda: done.append(3))
+    assert done == [1, 2, 3]
+
+
+def test_without_a_thread_a_job_is_done_at_once() -> None:
+    """The same words, for who need not wait for anything; what a job raises is raised where it was given."""
+    done: list[int] = []
+    at_once = AtOnce()
+    at_once.do(lambda: done.append(1))
+    assert done == [1]
+    with pytest.raises(ZeroDivisionError):
+        at_once.do(lambda: 1 // 0)
+    at_once.wait()
+    at_once.close()
