@@ -9,6 +9,7 @@ from gateway.settings import DEMO_SITE, Site
 from sim.overrides import OverrideError, SceneParameters, override
 from sim.scene import Scene
 from sim.scenes.approach import approach, approach_parameters, landing, landing_parameters
+from sim.scenes.conflicts import conflicts, conflicts_parameters
 from sim.scenes.placement import as_the_site_says
 from sim.scenes.traffic import traffic, traffic_parameters
 
@@ -33,6 +34,7 @@ SCENES: Mapping[str, SceneKind] = {
     "approach": SceneKind("one aircraft on 003's approach, 457 s", approach_parameters(), approach),
     "landing": SceneKind("the same approach flown to this runway, down to a standstill", landing_parameters(), landing),
     "traffic": SceneKind("many aircraft: arrivals, crossings, go-arounds, holdings", traffic_parameters(), traffic),
+    "conflicts": SceneKind("twenty pairs that lose their separation", conflicts_parameters(), conflicts),
 }
 
 
