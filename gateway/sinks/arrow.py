@@ -1,4 +1,4 @@
-"""The archive's tables while a session runs: tracks, predictions and truth as Arrow IPC streams.
+"""The archive's tables while a session runs: tracks, predictions, conflicts and truth as Arrow IPC streams.
 
 A Parquet file that was never closed cannot be read, an Arrow stream can be, up to its last whole batch. So
 rows go to NAME.arrows at least once a second, and `gateway.sinks.parquet.finish` makes NAME.parquet of it: at
@@ -12,6 +12,7 @@ A write that fails (disk full) raises OSError, and the stream is cut back to its
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -23,7 +24,7 @@ import pyarrow as pa
 from gateway.fuse import Fused
 from gateway.observation import Truth
 from gateway.picture import Picture
-from gateway.predict import Predicted
+from gateway.predict import Conflicts, Predicted
 
 _TIME = pa.timestamp("ns", tz="UTC")
 _REAL = pa.float64()
@@ -73,7 +74,22 @@ PREDICTIONS = pa.schema(
 
 TRUTH = pa.schema([pa.field("time", _TIME, nullable=False), ("aircraft", _TEXT), *_PLACE, *_VELOCITY, ("mode", _TEXT)])
 
-SCHEMAS = {"tracks": TRACKS, "predictions": PREDICTIONS, "truth": TRUTH}
+CONFLICTS = pa.schema(
+    [
+        pa.field("time", _TIME, nullable=False),
+        pa.field("track", pa.int64(), nullable=False),
+        pa.field("other_track", pa.int64(), nullable=False),
+        ("state", _TEXT),  # "found", "goes on", "over": then the rest is as it was told last
+        ("loses_separation", _TIME),
+        ("closest", _TIME),
+        *_PLACE,  # in the middle between both when they are nearest
+        ("horizontal_m", _REAL),  # then
+        ("vertical_m", _REAL),
+        ("probability", _REAL),
+    ]
+)
+
+SCHEMAS = {"tracks": TRACKS, "predictions": PREDICTIONS, "conflicts": CONFLICTS, "truth": TRUTH}
 """The tables of a session by the stem of their files."""
 
 _TRACK_TEXTS = ("aircraft", "radar_track", "updated_by", "state")
@@ -137,6 +153,25 @@ def predictions_batch(parts: Sequence[Predicted]) -> pa.RecordBatch:
         _real(np.degrees(np.concatenate([part.course_rad for part in parts]))),
     ]
     return pa.RecordBatch.from_arrays(columns, schema=PREDICTIONS)
+
+
+def conflicts_batch(parts: Sequence[Conflicts]) -> pa.RecordBatch:
+    """The conflicts of many rounds as one batch of the CONFLICTS schema."""
+    pairs = [pair for part in parts for pair in part.pair]
+    columns = [
+        _time(np.concatenate([part.time for part in parts])),
+        *(pa.array([pair[side] for pair in pairs], type=pa.int64()) for side in (0, 1)),
+        _text([part.state for part in parts]),
+        _time(np.concatenate([part.loses_at for part in parts])),
+        _time(np.concatenate([part.closest_at for part in parts])),
+        _real(np.degrees(np.concatenate([part.latitude_rad for part in parts]))),
+        _real(np.degrees(np.concatenate([part.longitude_rad for part in parts]))),
+        *(
+            _real(np.concatenate([getattr(part, name) for part in parts]))
+            for name in ("height_m", "horizontal_m", "vertical_m", "probability")
+        ),
+    ]
+    return pa.RecordBatch.from_arrays(columns, schema=CONFLICTS)
 
 
 def truth_batch(rows: Sequence[Truth], geoid_separation_m: float) -> pa.RecordBatch:
@@ -219,7 +254,7 @@ class _Table(Generic[Part]):
 
 
 class ArrowSink:
-    """Writes tracks.arrows, predictions.arrows and truth.arrows into a folder that exists.
+    """Writes tracks.arrows, predictions.arrows, conflicts.arrows and truth.arrows into a folder that exists.
 
     Rows wait at most `period_s` of session time or until `rows_limit` of them wait. `geoid_separation_m`
     lifts a truth that is only known above mean sea level. Every method raises OSError when the disk does not
@@ -236,6 +271,7 @@ class ArrowSink:
         self._refused = False  # the disk did not take something, which was told
         self._tracks: _Table[Fused] = _Table(folder, "tracks", tracks_batch)
         self._predictions: _Table[Predicted] = _Table(folder, "predictions", predictions_batch)
+        self._conflicts: _Table[Conflicts] = _Table(folder, "conflicts", conflicts_batch)
         self._truth: _Table[Truth] = _Table(folder, "truth", lambda rows: truth_batch(rows, geoid_separation_m))
 
     def write(self, picture: Picture) -> None:
@@ -244,6 +280,8 @@ class ArrowSink:
             self._tracks.add(picture.fuse)
         if len(picture.predict.made):
             self._predictions.add(picture.predict)
+        if len(picture.predict.conflicts.time):
+            self._conflicts.add(picture.predict.conflicts)
         self._truth.add(*picture.truth)
         self._rows += len(picture.fuse.time) + len(picture.predict.made) + len(picture.truth)
         self.flush(picture.now)
@@ -256,7 +294,7 @@ class ArrowSink:
             self._flushed_at = now
             self._rows = 0
             try:
-                for table in (self._tracks, self._predictions, self._truth):
+                for table in (self._tracks, self._predictions, self._conflicts, self._truth):
                     table.flush()
             except OSError:
                 self._refused = True
@@ -265,13 +303,9 @@ class ArrowSink:
     def close(self) -> None:
         """Write out everything and end the streams; calling it again does nothing. A full disk is told once."""
         try:
-            try:
-                self._tracks.close()
-            finally:
-                try:
-                    self._predictions.close()
-                finally:
-                    self._truth.close()
+            with contextlib.ExitStack() as closing:  # each, whatever another one says
+                for table in (self._truth, self._conflicts, self._predictions, self._tracks):
+                    closing.callback(table.close)
         except OSError:
             if not self._refused:
                 raise

@@ -17,6 +17,7 @@ from gateway.sinks.feed import FileFeed, Identity, ServedFeed
 from gateway.sinks.hold import Hold
 from gateway.sinks.recording import optimise
 from gateway.sinks.scene.clutter import ClutterScene
+from gateway.sinks.scene.conflicts import ConflictScene
 from gateway.sinks.scene.entry import Entry, made
 from gateway.sinks.scene.flown import Flights
 from gateway.sinks.scene.health import HealthScene
@@ -77,7 +78,7 @@ class RerunSink:
         self._approach, self._predict, self._stages = ApproachScene(site), PredictScene(site), StageScene(site)
         self._scope, self._health, self._plans = ScopeScene(site), HealthScene(), PlanScene(site)
         self._smoothed, self._register, self._radars = SmoothedScene(site), RegisterScene(site), MultiRadarScene(site)
-        self._clutter = ClutterScene()
+        self._clutter, self._conflicts = ClutterScene(), ConflictScene(site)
         self._period_ns, self._rows_limit = round(period_s * 1e9), rows_limit
         self._rest_ns = self._period_ns
         self._waiting: list[Picture] = []
@@ -159,6 +160,7 @@ class RerunSink:
             *self._tracks.entries(flights),
             *self._approach.entries(flights),
             *self._predict.entries(pictures, flights),
+            *self._conflicts.entries(pictures),
             *self._stages.entries(pictures, flights, self._flights.newest),
             *self._register.entries(pictures),
             *self._health.entries(pictures),

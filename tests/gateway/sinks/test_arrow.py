@@ -129,10 +129,11 @@ def test_finish_makes_parquet_of_a_cut_stream_and_takes_the_stream_away(tmp_path
     whole = sum(len(batch) for batch in whole_batches(stream))
     stream.write_bytes(stream.read_bytes()[:-100])
     assert unfinished(tmp_path)
-    assert [path.name for path in finish(tmp_path)] == ["tracks.parquet", "predictions.parquet", "truth.parquet"]
+    made = [path.name for path in finish(tmp_path)]
+    assert made == ["tracks.parquet", "predictions.parquet", "conflicts.parquet", "truth.parquet"]
     assert 0 < pq.read_table(tmp_path / "tracks.parquet").num_rows < whole
     assert not unfinished(tmp_path)
-    assert sorted(path.suffix for path in tmp_path.iterdir()) == [".parquet"] * 3
+    assert sorted(path.suffix for path in tmp_path.iterdir()) == [".parquet"] * 4
     assert finish(tmp_path) == ()
 
 
