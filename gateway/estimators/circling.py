@@ -33,7 +33,7 @@ class Circles:
     least: Floats
 
 
-def entered(path: Path, point: Floats, circles: Circles | None, leg: int) -> tuple[Floats, Bools]:
+def entered(path: Path, point: Floats, circles: Circles | None, leg: int, bend_m: Floats) -> tuple[Floats, Bools]:
     """What a leg is flown at (n, 2): its point, or where its circle is entered; and who (n,) is on that circle already."""
     if circles is None:
         return point, np.zeros(len(point), dtype=np.bool_)
@@ -42,15 +42,22 @@ def entered(path: Path, point: Floats, circles: Circles | None, leg: int) -> tup
     distance = np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1])
     round_it = ~np.isnan(radius)
     arrived = round_it & (distance <= ON_CIRCLE * radius)
-    sine = np.where(round_it & ~arrived, radius / np.maximum(distance, 1e-9), 0.0)
-    towards = np.arctan2(way[:, 1], way[:, 0]) - np.sign(circles.radius[:, leg]) * np.arcsin(np.minimum(sine, 1.0))
-    length = distance * np.sqrt(np.maximum(1.0 - sine * sine, 0.0))
-    entry = path.position + length[:, None] * np.stack([np.cos(towards), np.sin(towards)], axis=-1)
-    return np.where((round_it & ~arrived)[:, None], entry, point), arrived
+    # flown at the middle, as autopilots do, until a turn to the other side leads onto the circle
+    begins = np.sqrt(radius * radius + 2.0 * radius * bend_m)
+    share = np.maximum(1.0 - begins / np.maximum(distance, 1e-9), 0.0)
+    return np.where((round_it & ~arrived)[:, None], path.position + share[:, None] * way, point), arrived
 
 
-def go_round(path: Path, circles: Circles, leg: int, following: Floats, speed_on: Callable[[Floats], Floats]) -> None:
-    """Round a leg's circle, where it has one, until the next point is ahead and the least angle is flown.
+def go_round(
+    path: Path,
+    circles: Circles,
+    leg: int,
+    following: Floats,
+    arrived: Bools,
+    turning_rps: Floats,
+    speed_on: Callable[[Floats], Floats],
+) -> None:
+    """Onto a leg's circle, where it has one, and round it until the next point is ahead and the least angle is flown.
 
     In quarters, each at the ground speed of its middle.
     """
@@ -58,6 +65,7 @@ def go_round(path: Path, circles: Circles, leg: int, following: Floats, speed_on
     round_it = ~np.isnan(radius)
     if not round_it.any():
         return
+    _bend(path, np.where(arrived, math.nan, radius), leg, turning_rps, speed_on(path.course))
     way = following[:, leg] - path.position
     distance = np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1])
     near = (distance > 0.5 * np.abs(radius)) & (distance <= ON_CIRCLE * np.abs(radius))
@@ -73,3 +81,12 @@ def go_round(path: Path, circles: Circles, leg: int, following: Floats, speed_on
         ground = speed_on(path.course + 0.5 * side * np.minimum(arc, QUARTER_RAD))
         path.extend(ground, np.where(round_it, side * ground / size, 0.0), arc * size / ground, leg)
         go = go - arc
+
+
+def _bend(path: Path, radius: Floats, leg: int, turning_rps: Floats, ground: Floats) -> None:
+    """Who flew at the middle of a circle of a radius (n,), NaN = nobody does, turns aside until it flies along the circle."""
+    round_it = ~np.isnan(radius)
+    own = ground / turning_rps
+    size = np.where(round_it, np.abs(radius), 0.0)
+    angle = np.where(round_it, np.arctan2(np.sqrt(size * size + 2.0 * size * own), own), 0.0)
+    path.extend(ground, np.where(round_it, -np.sign(radius) * turning_rps, 0.0), angle / turning_rps, leg)

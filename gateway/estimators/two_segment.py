@@ -32,6 +32,7 @@ STRAIGHT_RPS = 1e-9  # slower turns are none
 ALIGNED_RAD = math.radians(0.5)  # a turn by less is a straight
 ROLL_OUT_RAD = math.radians(45.0)  # who is no more than this beyond its point turns back to it
 MOST_LEAD = 2.0  # radii: no turn begins earlier before its point
+FASTER = 4.0  # than usual who begins a turn late turns where the corner asks for it
 LEAST_SPEED_MPS = 0.1
 
 
@@ -68,13 +69,11 @@ class Ahead:
         )
 
 
-def ground_speed(course: Floats, speed: Floats, air_course: Floats, wind: Floats) -> Floats:
-    """Ground speed (n,) on a course, of who has ground speed `speed` on course `air_course`, in a wind (n, 2)."""
-    air_x = speed * np.cos(air_course) - wind[:, 0]
-    air_y = speed * np.sin(air_course) - wind[:, 1]
+def ground_speed(course: Floats, air_speed: Floats, wind: Floats) -> Floats:
+    """Ground speed (n,) on a course, at a speed through the air (n,), in a wind (n, 2)."""
     along = wind[:, 0] * np.cos(course) + wind[:, 1] * np.sin(course)
     across = wind[:, 1] * np.cos(course) - wind[:, 0] * np.sin(course)
-    rest = air_x * air_x + air_y * air_y - across * across
+    rest = air_speed * air_speed - across * across
     return np.maximum(along + np.sqrt(np.maximum(rest, 0.0)), LEAST_SPEED_MPS)
 
 
@@ -88,39 +87,51 @@ def ahead(
     wind: Floats | None = None,
     braking: Floats | None = None,
     circles: Circles | None = None,
+    air_speed: Floats | None = None,
+    slower: Floats | None = None,
+    lead_m: Floats | None = None,
 ) -> Ahead:
     """The paths of n aircraft along their routes (n, p, 2) at horizons (h,) or (n, h); past the last point straight on.
 
     `turning_rps` (n,) is how fast they turn where they do not turn yet; `wind` (n, 2) where the air moves to, m/s, 0 where it
-    is not known; `braking` (n,) m/s2 of who comes to rest beyond the last point, 0 of others; `circles` which points are flown
-    round. Who cannot come to point at the route is carried on in its present turn, and does not follow.
+    is not known, and `air_speed` (n,) the speed through it that is kept; `slower` (n, p) what that is multiplied by on the way
+    from one point to the next. `lead_m` (n,) is how near to a point the turn to the next begins, if it need not begin earlier;
+    None = it begins where the usual turn needs. `braking` (n,) m/s2 of who comes to rest beyond the last point, 0 of others;
+    `circles` which points are flown round. Who cannot come to point at the route is carried on in its present turn, and does
+    not follow.
     """
     n = len(now.position)
     speed = np.sqrt(now.velocity[:, 0] * now.velocity[:, 0] + now.velocity[:, 1] * now.velocity[:, 1])
     course = np.arctan2(now.velocity[:, 1], now.velocity[:, 0])
+    calm = np.zeros((n, 2)) if wind is None or rule == "literal" else wind
+    air = np.sqrt(((now.velocity - calm) ** 2).sum(axis=1)) if air_speed is None else air_speed
+    if air_speed is not None:
+        speed = ground_speed(course, air, calm)
     path = Path.at_start(now.position, course, np.broadcast_to(horizons_s, (n, np.shape(horizons_s)[-1])))
     if rule == "literal":
-        route, wind = route[:, :1], None
+        route = route[:, :1]
     following = _following(route)
-    target, arrived = entered(path, following[:, 0], circles, 0)
+    target, arrived = entered(path, following[:, 0], circles, 0, speed / turning_rps)
     turn, rate, follows = _first_turn(now, speed, course, target, following, turning_rps, rule)
     turn, follows = np.where(arrived, 0.0, turn), follows | arrived
-    ground = speed
+    ground, cornering = speed, turning_rps
 
     def speed_on(heading: Floats) -> Floats:
-        return speed if wind is None else ground_speed(heading, speed, course, wind)
+        return ground_speed(heading, air, calm)
 
     for leg in range(route.shape[1]):
         if leg:
-            target, arrived = entered(path, following[:, leg], circles, leg)
-            turn, rate = _next_turn(path, target, ground, turning_rps)
-            turn = np.where(arrived, 0.0, turn)
+            if slower is not None:
+                air = air * slower[:, leg]
+            target, arrived = entered(path, following[:, leg], circles, leg, ground / turning_rps)
+            turn, rate = _next_turn(path, target, ground, cornering)
+            turn = np.where(arrived | (following[:, leg] == following[:, leg - 1]).all(axis=1), 0.0, turn)
         path.extend(ground, rate, turn / np.maximum(np.abs(rate), STRAIGHT_RPS), leg)
         ground = speed_on(path.course)
-        straight_m = np.where(arrived, 0.0, _straight(path, target, following[:, leg : leg + 2], ground / turning_rps))
-        path.extend(ground, np.zeros(n), straight_m / ground, leg)
+        straight_m, cornering = _straight(path, target, following[:, leg : leg + 2], ground, turning_rps, lead_m)
+        path.extend(ground, np.zeros(n), np.where(arrived, 0.0, straight_m) / ground, leg)
         if circles is not None:
-            go_round(path, circles, leg, following, speed_on)
+            go_round(path, circles, leg, following, arrived, turning_rps, speed_on)
             ground = speed_on(path.course)
     path.stop(ground, np.zeros(n) if braking is None else braking, route.shape[1])
     on = Path.at_start(now.position, course, path.horizons)
@@ -174,16 +185,24 @@ def _next_turn(path: Path, point: Floats, ground: Floats, turning_rps: Floats) -
     return np.where(small, 0.0, np.where(np.isnan(go), np.abs(off), go)), side * turning_rps
 
 
-def _straight(path: Path, target: Floats, following: Floats, radius: Floats) -> Floats:
-    """How far (n,) it is straight on to a target (n, 2), less what the turn to the point after it, (n, 1, 2), needs."""
+def _straight(
+    path: Path, target: Floats, following: Floats, ground: Floats, turning_rps: Floats, lead_m: Floats | None
+) -> tuple[Floats, Floats]:
+    """How far (n,) it is straight on to a target (n, 2), less what the turn to the point after it, (n, 1, 2), needs; its rate.
+
+    Who begins to turn late for the corner turns faster.
+    """
     way = target - path.position
     distance = np.nan_to_num(way[:, 0] * np.cos(path.course) + way[:, 1] * np.sin(path.course))
     further = following[:, 1] - following[:, 0]
     turn = wrap_rad(np.arctan2(further[:, 1], further[:, 0]) - path.course)
     entering = (target != following[:, 0]).any(axis=1)  # a circle: it is not cut short
     turn = np.where((further == 0.0).all(axis=1) | np.isnan(turn) | entering, 0.0, np.abs(turn))
-    lead = radius * np.minimum(np.tan(0.5 * np.minimum(turn, 0.75 * math.pi)), MOST_LEAD)
-    return np.maximum(distance - lead, 0.0)
+    radius, bend = ground / turning_rps, np.tan(0.5 * np.minimum(turn, 0.75 * math.pi))
+    if lead_m is None:
+        return np.maximum(distance - radius * np.minimum(bend, MOST_LEAD), 0.0), turning_rps
+    faster = np.clip(radius * bend / lead_m, 1.0, FASTER)
+    return np.maximum(distance - np.minimum(radius * bend / faster, lead_m), 0.0), turning_rps * faster
 
 
 def _off(position: Floats, course: Floats, point: Floats) -> Floats:

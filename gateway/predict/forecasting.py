@@ -36,6 +36,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 WIND_WITHIN = 60 * SECOND  # a wind told this lately is still so
+APPROACH = 0.8  # of its speed through the air an aircraft keeps on the way to a landing
+LEAD_S = 2.0  # autopilots fly on until they are so near to a point
 LANDED_MPS2, ROUND_MPS2 = 2.0, 20.0  # braking beyond a landing, and at the middle of a circle that is to be flown
 
 
@@ -57,7 +59,11 @@ def forecast(
     before = predicting.remembered.of(tracks)
     state = State.of(lanes, at, model)
     usual = level_turn_rate(state.speed, site.estimation.bank_rad, site.estimation.turn_rate_rps)
-    now, minds = motions(before, at, state.position, state.velocity, state.velocity_sigma, state.sides, usual)
+    winds = _winds(predicting, lanes, at)
+    through_air = np.sqrt(((state.velocity - winds) ** 2).sum(axis=1))
+    now, minds = motions(
+        before, at, state.position, state.velocity, state.velocity_sigma, state.sides, usual, through_air
+    )
     way, minds = chosen(before, minds, at, now, goals, state.climb, site)
     horizons = state.since_s[:, None] + np.array(horizons_s)
     start = two_segment.Moving(state.at_position, state.velocity, np.where(way.circles, way.rate, now.turn_rate))
@@ -68,7 +74,10 @@ def forecast(
         way.route,
         around,
         now.turning,
-        wind=_winds(predicting, lanes, at),
+        wind=winds,
+        air_speed=now.cruise,
+        slower=np.where(way.lands, APPROACH, 1.0),
+        lead_m=LEAD_S * np.maximum(state.speed, 1.0),
         braking=braking,
         circles=way.rounds if np.isfinite(way.rounds.radius).any() else None,
     )

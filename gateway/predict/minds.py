@@ -30,6 +30,8 @@ class Minds:
     speed: Floats  # (n,)
     wander: Floats  # (n,) mean square of what the speed changes by in a second, faded; NaN = not known yet
     unsettled: Floats  # (n,) radians that it turned by lately, faded
+    cruise: Floats  # (n,) speed through the air that it keeps, m/s; NaN = not known yet
+    turned: Floats  # (n,) radians that it turned by since it was first thought of
     agreed: Floats  # (n, c), `intent.Seen`
     length: Floats  # (n,)
     last: Floats  # (n, c)
@@ -48,6 +50,8 @@ class Minds:
             np.full(n, UNKNOWN),
             np.full((n, 2), math.nan),
             zero,
+            zero,
+            np.full(n, math.nan),
             zero,
             np.full(n, math.nan),
             zero,

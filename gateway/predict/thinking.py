@@ -28,6 +28,9 @@ SPEED_SIGMAS = 1.5
 WANDER_MEMORY_S = 20.0
 WANDERS_LESS = 3.0  # a filter's velocity is wrong by no more than so often what it changes by in a second
 SURE_AT_MOST = 0.25  # but by no less than this share of what the filter says
+TURNS_RAD = 0.25  # who has turned by more lately is in a turn, or just out of one
+CRUISE_S, CRUISE_IN_TURN_S = 6.0, 60.0  # for how long a speed is remembered
+ANOTHER_CRUISE = 0.12  # who flies straight and is faster or slower by such a share has taken up another speed
 UNSETTLED_S = 8.0  # how long a turn is felt
 
 REACTS_S = 6.0  # after a new goal was declared the aircraft has this long to begin to turn
@@ -52,6 +55,8 @@ class Motions:
     acceleration: Floats  # of the ground speed, as far as it is sure, m/s2
     speed_sigma: Floats  # of the velocity, m/s: the filter's, or less where the speed hardly moves about
     unsettled: Floats  # radians that it turned by lately
+    cruise: Floats  # speed through the air that it keeps
+    turned: Floats  # radians that it has turned by since it was first thought of
 
 
 def motions(
@@ -62,6 +67,7 @@ def motions(
     velocity_sigma: Floats,
     sides: Floats,
     usual_rate: Floats,
+    air_speed: Floats,
 ) -> tuple[Motions, Minds]:
     """How n aircraft move now, and what is remembered of that.
 
@@ -91,9 +97,11 @@ def motions(
     wander = _wander(before, speed, fresh, period_s)
     steady = np.where(np.isnan(wander), math.inf, WANDERS_LESS * np.sqrt(np.nan_to_num(wander)))
     course_sigma = velocity_sigma / np.maximum(speed, LEAST_SPEED_MPS)
-    turned = np.where(fresh | (speed < LEAST_SPEED_MPS), 0.0, np.abs(wrap_rad(course - before.courses[:, 0])))
+    slow = np.minimum(speed, before.speed) < LEAST_SPEED_MPS
+    turned = np.where(fresh | slow, 0.0, np.abs(wrap_rad(course - before.courses[:, 0])))
     turned = turned**3 / np.maximum(turned * turned + (2.0 * course_sigma) ** 2, 1e-12)  # as far as it is no noise
     unsettled = np.where(fresh, 0.0, before.unsettled * np.exp(-period_s / UNSETTLED_S)) + turned
+    cruise, all_turned = _cruise(before, air_speed, unsettled, fresh, period_s), before.turned + turned
     minds = replace(
         before,
         at=np.full(len(speed), at),
@@ -102,9 +110,37 @@ def motions(
         speed=speed,
         wander=wander,
         unsettled=unsettled,
+        cruise=cruise,
+        turned=all_turned,
     )
     turn_rate, sure = np.where(side == 0, 0.0, rate), np.clip(steady, SURE_AT_MOST * velocity_sigma, velocity_sigma)
-    return Motions(position, velocity, speed, course, side, turn_rate, usual_rate, gained, sure, unsettled), minds
+    return (
+        Motions(
+            position,
+            velocity,
+            speed,
+            course,
+            side,
+            turn_rate,
+            usual_rate,
+            gained,
+            sure,
+            unsettled,
+            cruise,
+            all_turned,
+        ),
+        minds,
+    )
+
+
+def _cruise(before: Minds, air_speed: Floats, unsettled: Floats, fresh: Bools, period_s: Floats) -> Floats:
+    """The speed (n,) through the air that is kept: in a turn it is what it was before, since turns slow down or speed up."""
+    turns = unsettled > TURNS_RAD
+    known = ~(fresh | np.isnan(before.cruise) | (before.speed < LEAST_SPEED_MPS))
+    kept = np.where(known, before.cruise, air_speed)
+    other = ~turns & (np.abs(air_speed - kept) > ANOTHER_CRUISE * kept)
+    keep = np.where(other, 0.0, np.exp(-period_s / np.where(turns, CRUISE_IN_TURN_S, CRUISE_S)))
+    return np.asarray(keep * kept + (1.0 - keep) * air_speed)
 
 
 def _wander(before: Minds, speed: Floats, fresh: Bools, period_s: Floats) -> Floats:
