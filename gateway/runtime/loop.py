@@ -19,10 +19,8 @@ from gateway.runtime.setup import RunFailure, Setup
 from gateway.runtime.summary import Summary
 
 TICK_S = 0.01  # so that a late report is in the picture within 30 ms also when a tick draws, which takes 15
-_BUSY_TICK_S = (
-    0.02  # where thousands come a second, half as many steps of twice the size: a step has a price of its own
-)
-_BUSY = 100  # arrivals a tick
+_LONGER_TICKS_S = ((25_000, 0.05), (5_000, 0.02))
+"""From so many arrivals a second on, how long a tick is: a step has a price of its own, so fewer and larger ones cost less."""
 _IDLE_NS = 100_000_000  # when nothing came, the watermark alone is worked in this often: an empty step costs 1 ms
 _REPLAY_STEP_NS = 1_000_000_000  # of stamps, at full speed: large steps are cheap steps
 _PACED_STEP_NS = 40_000_000
@@ -85,9 +83,9 @@ def _live(
     tick: Callable[[], int], run: Run, seconds: float | None, asked_to_stop: AskedToStop, no_place_after_s: float
 ) -> str:
     """Tick until the end; how it ended."""
-    began = time.monotonic()
+    began = tick_began = time.monotonic()
     while True:
-        tick_began = time.monotonic()
+        before, tick_began = tick_began, time.monotonic()
         arrivals = tick()
         if run.place is None and run.heard_for_s > no_place_after_s:
             raise RunFailure(
@@ -98,7 +96,8 @@ def _live(
             return f"stopped by {asker}"
         if seconds is not None and tick_began - began >= seconds:
             return "done"
-        tick_s = TICK_S if arrivals < _BUSY else _BUSY_TICK_S
+        a_second = arrivals / max(tick_began - before, TICK_S)  # these are what came since the tick before
+        tick_s = next((longer for least, longer in _LONGER_TICKS_S if a_second >= least), TICK_S)
         time.sleep(max(0.0, tick_s - (time.monotonic() - tick_began)))
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.fuse import Fused
-from gateway.observation import Attitude, FlightPlan, GpsReport, Intent, RadarPlot
+from gateway.observation import Attitude, FlightPlan, GpsReport, Intent, Observation, RadarPlot
 from gateway.picture import Health, Picture
 from gateway.settings import Site
 from gateway.sinks.serving import free_port
@@ -28,7 +28,8 @@ SIZE_BYTES = 8
 _GATHERED_NS = 100_000_000  # of session time: a message costs the same for one picture as for ten
 _GATHERED_AT_MOST = 16  # pictures; more in one message would hold the interpreter for long
 _HEALTH_NS = 1_000_000_000  # as often as it is drawn
-_DRAWN = GpsReport | RadarPlot | Attitude | FlightPlan | Intent
+_ATTITUDE_NS = 20_000_000  # of one aircraft: a symbol that turns 50 times a second turns smoothly
+_DRAWN = GpsReport | RadarPlot | FlightPlan | Intent
 
 
 class Apart:
@@ -46,6 +47,7 @@ class Apart:
         self._gathered: list[Picture] = []
         self._since: int | None = None
         self._health_at: int | None = None
+        self._attitude_at: dict[str, int] = {}
         self._unanswered = 0
         self._is_open = True
         self.address: str | None = None  # what a viewer opens, once it can
@@ -105,10 +107,20 @@ class Apart:
             self._health_at = picture.now
         return replace(
             picture,
-            observations=tuple(one for one in picture.observations if isinstance(one, _DRAWN)),
+            observations=tuple(filter(self._is_drawn, picture.observations)),
             fuse=replace(picture.fuse, settled=()),
             health=picture.health if is_told else Health(),
         )
+
+    def _is_drawn(self, one: Observation) -> bool:
+        """Whether it is drawn; of attitudes that come thick, some."""
+        if not isinstance(one, Attitude):
+            return isinstance(one, _DRAWN)
+        last = self._attitude_at.get(one.aircraft)
+        if last is not None and 0 <= one.valid_at - last < _ATTITUDE_NS:
+            return False
+        self._attitude_at[one.aircraft] = one.valid_at
+        return True
 
     def _hand_over(self) -> None:
         gathered, self._gathered = self._gathered, []

@@ -7,10 +7,13 @@ import resource
 import signal
 import socket
 from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
+from gateway.observation import Attitude
 from gateway.picture import Picture
 from gateway.settings import DEMO_SITE
 from gateway.sinks.apart import Apart
@@ -69,6 +72,33 @@ def test_the_same_is_drawn_as_here_whatever_the_terminal_tells_everybody(tmp_pat
     drawn = {name: without_row_ids(read(tmp_path / f"{name}.rrd")) for name in ("here", "apart")}
     assert drawn["apart"].keys() == drawn["here"].keys()
     assert repr(drawn["apart"]) == repr(drawn["here"])  # as text, where what is not known equals itself
+
+
+def test_of_attitudes_that_come_thick_fifty_a_second_of_each_aircraft_are_carried_over(pictures, monkeypatch):
+    """To carry five hundred over takes longer than to draw them, and nobody sees a symbol turn so often."""
+    carried: list[Picture] = []
+    monkeypatch.setattr(
+        Apart, "_tell", lambda self, what, *about: carried.extend(about[0] if what == "write_all" else ())
+    )
+    sink = Apart(DEMO_SITE, path=None, serve=None)
+    made = pictures(1.0)[0]
+    thick = [
+        Attitude(f"mavlink:{number}", made.now + place * 2_000_000, made.now, 0.0, 0.0, place / 100)
+        for place in range(500)
+        for number in (1, 2)
+    ]
+    sink.write(replace(made, observations=(*made.observations, *thick[:400])))
+    sink.write(replace(made, observations=tuple(thick[400:]), now=made.now + 10**9))
+    sink._end()
+    for name in ("mavlink:1", "mavlink:2"):
+        told = [
+            one
+            for picture in carried
+            for one in picture.observations
+            if isinstance(one, Attitude) and one.aircraft == name and one.yaw_rad == (one.valid_at - made.now) / 2e8
+        ]
+        assert len(told) == 50
+        assert max(after.valid_at - before.valid_at for before, after in pairwise(told)) == 20_000_000
 
 
 def test_a_port_that_is_taken_raises_at_once():
