@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.estimators.track_splitting_bank import Bank, begun, bounded, distinct, merged, rank
+from gateway.estimators.track_splitting_bank import Bank, begun, bounded, carried, distinct, likeliest, merged
 from gateway.estimators.track_splitting_gates import near
-from gateway.estimators.track_splitting_plots import Sight, corrected, moved
+from gateway.estimators.track_splitting_plots import Sight, along, corrected, spread
 from gateway.estimators.track_splitting_shares import shared
 
 __all__ = ["Bank", "Plots", "Scan", "Splitting", "scan"]
@@ -29,7 +29,8 @@ Bools = NDArray[np.bool_]
 
 SECOND = 1e9
 IN_GATE = 0.999
-GATE = np.array([0.0, 10.828, 13.816, 16.266])  # chi-square of that, by measured components
+GATES = (0.0, 10.828, 13.816, 16.266)  # chi-square of that, by measured components
+GATE = np.array(GATES)
 NEW_AT = 0.25  # a plot that is explained by less than the rest of this begins a track
 TINY = 1e-300
 
@@ -69,6 +70,12 @@ class Plots:
         """How many there are."""
         return len(self.at)
 
+    @property
+    def missing(self) -> Bools | None:
+        """What was not measured (k, m); None: everything was."""
+        missing = np.isnan(self.value)
+        return missing if missing.any() else None
+
 
 @dataclass(frozen=True, slots=True)
 class Scan:
@@ -80,13 +87,23 @@ class Scan:
 
 @dataclass(frozen=True, slots=True)
 class _Pairs:
-    """Hypotheses and plots within their gates, in this order: the states after it and the plots' likelihoods (p,)."""
+    """The p pairs of hypothesis and plot within its gate, in this order; and q states after plots, of which each has one."""
 
     row: Ints
+    family: Ints  # the hypothesis's
     plot: Ints
-    mean: Floats
-    covariance: Floats
     likelihood: Floats  # detected there, against clutter there
+    state: Ints  # of q
+    mean: Floats  # (2A, q)
+    covariance: Floats  # (2A, 2A, q)
+
+
+@dataclass(frozen=True, slots=True)
+class _Looked:
+    """Which families (f,) a look told of, True = all; and since when each is next looked at."""
+
+    told: Bools | bool
+    at: Ints  # ns
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,138 +125,137 @@ def scan(
     Plots need not be of that very instant. `period_s`: what comes is a piece of a scan that takes so long. Then it tells of a
     family that has a plot in it and was not looked at for half of that, or that was not for one and a half.
     """
-    mean, covariance = moved(bank.mean, bank.covariance, (at - bank.at) / SECOND, model.acceleration_density)
-    families = len(bank.number)
-    since_s = (at - bank.looked) / SECOND
-    may = np.ones(families, np.bool_) if period_s is None else since_s >= 0.5 * period_s
-    pairs = _paired(mean, covariance, plots, at, sight, np.where(may, model.detection, 0.0)[bank.family])
-    looked, looked_at = may, np.full(families, at)
-    if period_s is not None:
-        with_plots = np.zeros(families, np.bool_)
-        with_plots[bank.family[pairs.row]] = True
-        overdue = since_s >= 1.5 * period_s
-        looked = with_plots | overdue
-        missed_at = bank.looked + np.where(overdue, round(period_s * SECOND), 0)
-        looked_at = np.where(with_plots, at, missed_at)
-    weighed = _weighed(bank, pairs, np.where(looked, model.detection, 0.0), len(plots), model)
-    grown = _split(bank, mean, covariance, pairs, weighed, plots.serial, at, model, looked, looked_at)
+    bank = carried(bank, at, model.acceleration_density)
+    may = None if period_s is None else at - bank.looked >= 0.5 * period_s * SECOND
+    pairs = _paired(bank, plots, sight, model.detection, may)
+    looked = _looked(bank, pairs, period_s)
+    weighed = _weighed(bank, pairs, looked, len(plots), model)
+    grown = _split(bank, pairs, weighed, looked, plots.serial, model)
     if weighed.contested:
         grown = distinct(grown)
-    grown, left_out = bounded(_with_new(grown, plots, weighed.unexplained, at, sight, model), model.budget)
+    grown, left_out = bounded(_with_new(grown, plots, weighed.unexplained, sight, model), model.budget)
     return grown, Scan(weighed.unexplained, left_out)
 
 
-def _paired(mean: Floats, covariance: Floats, plots: Plots, at: int, sight: Sight, detection: Floats) -> _Pairs:
-    """Every hypothesis with every plot in its gate."""
-    axes = len(mean) // 2
-    expected, slope = sight.measured(mean[:axes])
-    gate = GATE[len(expected)]
-    reach = np.sqrt(gate * np.einsum("kan,abn,kbn->kn", slope, covariance[:axes, :axes], slope))
-    lead_s = (plots.at - at) / SECOND
-    late = bool(lead_s.any())
-    if late:
-        furthest_s = float(np.abs(lead_s).max())
-        rates = np.einsum("kan,abn,kbn->kn", slope, covariance[axes:, axes:], slope)
-        reach += furthest_s * (np.abs(np.einsum("kan,an->kn", slope, mean[axes:])) + np.sqrt(gate * rates))
-    row, plot = near(expected, reach, plots.value, np.sqrt(gate * plots.variance), sight.turn)
-    off = sight.off(plots.value[:, plot], expected[:, row])
-    slope = slope if slope.shape[2] == 1 else slope[:, :, row]
-    each_mean, each_covariance, distance, log_density = corrected(
-        mean[:, row], covariance[:, :, row], off, plots.variance[:, plot], slope, lead_s[plot] if late else None
+def _paired(bank: Bank, plots: Plots, sight: Sight, detection: float, may: Bools | None) -> _Pairs:
+    """Every hypothesis of the families (f,) that may have a plot, None = all, with every plot in its gate."""
+    axes = len(bank.mean) // 2
+    expected, slope = sight.measured(bank.mean[:axes])
+    gate: Floats | float = GATES[len(expected)]
+    reach, widths = gate * spread(slope, bank.covariance[:axes, :axes]), gate * plots.variance
+    lead_s = (plots.at - bank.at) / SECOND if (plots.at != bank.at).any() else None
+    if lead_s is not None:
+        reach, widths = _reaching(bank, slope, reach, widths, float(np.abs(lead_s).max()))
+    row, plot = near(expected, reach, plots.value, widths, sight.turn)
+    missing = plots.missing
+    if missing is not None:
+        missing = missing.take(plot, axis=1)
+        gate = GATE.take(len(expected) - missing.sum(axis=0))
+    mean, covariance, distance, density = corrected(
+        bank.mean.take(row, axis=1),
+        bank.covariance.take(row, axis=2),
+        sight.off(plots.value.take(plot, axis=1), expected.take(row, axis=1)),
+        plots.variance.take(plot, axis=1),
+        None if slope is None else slope.take(row, axis=2),
+        missing,
+        None if lead_s is None else lead_s.take(plot),
     )
-    inside = (distance <= GATE[len(expected) - np.isnan(off).sum(axis=0)]) & (detection[row] > 0.0)
-    if not inside.all():
-        row, plot, log_density = row[inside], plot[inside], log_density[inside]
-        each_mean, each_covariance = each_mean[:, inside], each_covariance[:, :, inside]
-    likelihood = detection[row] * np.exp(log_density) / plots.clutter[plot]
-    return _Pairs(row, plot, each_mean, each_covariance, likelihood)
+    family, inside = bank.family.take(row), distance <= gate
+    if may is not None:
+        inside &= may.take(family)
+    state = inside.nonzero()[0]
+    if len(state) < len(row):
+        row, family, plot, density = row.take(state), family.take(state), plot.take(state), density.take(state)
+    return _Pairs(row, family, plot, detection * density / plots.clutter.take(plot), state, mean, covariance)
 
 
-def _weighed(bank: Bank, pairs: _Pairs, seen: Floats, plots: int, model: Splitting) -> _Weighed:
+def _reaching(
+    bank: Bank, slope: Floats | None, reach: Floats, widths: Floats, furthest_s: float
+) -> tuple[Floats, Floats]:
+    """Squared gates of predictions (k, n) and plots (k, m) where plots are of instants up to so far off: wide enough."""
+    axes = len(bank.mean) // 2
+    rates = GATES[len(reach)] * spread(slope, bank.covariance[axes:, axes:])
+    speed = np.stack([np.abs(along(slope, component, bank.mean[axes:])) for component in range(len(reach))])
+    reach = (np.sqrt(reach) + furthest_s * (speed + np.sqrt(rates))) ** 2
+    return reach, widths + 2.0 * furthest_s * speed.max(axis=1, initial=0.0)[:, None] * np.sqrt(widths)
+
+
+def _looked(bank: Bank, pairs: _Pairs, period_s: float | None) -> _Looked:
+    """A whole scan tells of all; a piece of one of the families that have a plot in it, or were not looked at for too long."""
+    families = len(bank.number)
+    if period_s is None:
+        return _Looked(True, np.full(families, bank.at))
+    with_plots = np.zeros(families, np.bool_)
+    with_plots[pairs.family] = True
+    overdue = bank.at - bank.looked >= 1.5 * period_s * SECOND
+    missed_at = bank.looked + np.where(overdue, round(period_s * SECOND), 0)
+    return _Looked(with_plots | overdue, np.where(with_plots, bank.at, missed_at))
+
+
+def _weighed(bank: Bank, pairs: _Pairs, looked: _Looked, plots: int, model: Splitting) -> _Weighed:
     """What the scan says of families and hypotheses. Source: 002-6 eq 6 to 8; their beta_j is what `shared` gives."""
-    families = len(seen)
-    of = bank.family[pairs.row]
-    evidence = bank.weight[pairs.row] * pairs.likelihood
-    key: Ints = of * max(plots, 1) + pairs.plot
-    edge: NDArray[np.intp] | None = None
+    families, family, plot = len(bank.number), pairs.family, pairs.plot
+    evidence = bank.weight.take(pairs.row) * pairs.likelihood
+    edge: Ints | None = None
     by_edge = evidence
     if len(bank) != families:  # several hypotheses of a family may have one plot
-        key, edge = np.unique(key, return_inverse=True)
+        key, edge = np.unique(family * plots + plot, return_inverse=True)
         by_edge = np.asarray(np.bincount(edge, evidence, minlength=len(key)))
-    family: Ints = key // max(plots, 1)
-    plot: Ints = key % max(plots, 1)
+        family, plot = np.divmod(key, max(plots, 1))
     before = model.survival * bank.existence
-    missed = before * (1.0 - IN_GATE * seen)
+    missed = before * (1.0 - IN_GATE * model.detection * looked.told)
     none = 1.0 - before + missed
-    chance, nothing, unexplained, contested = shared(family, plot, before[family] * by_edge, none, plots)
+    chance, nothing, unexplained, contested = shared(family, plot, before.take(family) * by_edge, none, plots)
     unseen = nothing * missed / none
     existence = np.maximum(unseen + np.bincount(family, chance, minlength=families), TINY)
-    stays = bank.weight * (unseen / existence)[bank.family]
+    stays = bank.weight * (unseen / existence).take(bank.family)
     share = chance / np.maximum(by_edge, TINY)
-    splits = evidence * (share if edge is None else share[edge]) / existence[of]
+    splits = evidence * (share if edge is None else share.take(edge)) / existence.take(pairs.family)
     return _Weighed(existence, stays, splits, unexplained, contested)
 
 
-def _split(
-    bank: Bank,
-    mean: Floats,
-    covariance: Floats,
-    pairs: _Pairs,
-    weighed: _Weighed,
-    serial: Ints,
-    at: int,
-    model: Splitting,
-    looked: Bools,
-    looked_at: Ints,
-) -> Bank:
+def _split(bank: Bank, pairs: _Pairs, weighed: _Weighed, looked: _Looked, serial: Ints, model: Splitting) -> Bank:
     """The children that are kept: the likeliest of each family that lives on, in order of family and of weight."""
-    parents = len(weighed.stays)
-    weight = np.concatenate([weighed.stays, weighed.splits])
-    family = np.concatenate([bank.family, bank.family[pairs.row]])
-    existence = weighed.existence
+    existence, parents = weighed.existence, len(bank)
     lives = existence >= np.where(bank.confirmed, model.end_below, model.drop_below * bank.first)
-    some = np.flatnonzero((weight >= model.least_weight) & lives[family])
-    some = some[np.lexsort((-weight[some], family[some]))]
-    place = rank(family[some])
-    if len(place) and place.max() >= model.hypotheses:
-        some = some[place < model.hypotheses]
-    child = np.flatnonzero(some >= parents)
-    pair = some[child] - parents
-    parent = some.copy()
-    parent[child] = pairs.row[pair]
-    mean, covariance = mean[:, parent], covariance[:, :, parent]
-    mean[:, child], covariance[:, :, child] = pairs.mean[:, pair], pairs.covariance[:, :, pair]
-    newest = np.zeros((1, len(some)), np.int64)
-    newest[0, child] = serial[pairs.plot[pair]]
-    path = np.concatenate([newest, bank.path[:-1, parent]])
-    if not looked.all():
-        path = np.where(looked[family[some]], path, bank.path[:, parent])
+    weight = np.concatenate([weighed.stays, weighed.splits])
+    family = np.concatenate([bank.family, pairs.family])
+    some = likeliest(weight, family, (weight >= model.least_weight) & lives.take(family), model.hypotheses)
+    family = family.take(some)
+    every = np.arange(parents)
+    state = np.concatenate([every, parents + pairs.state]).take(some)
+    parent = np.concatenate([every, pairs.row]).take(some)
+    newest = np.concatenate([np.zeros(parents, np.int64), serial.take(pairs.plot)]).take(some)
+    path = np.concatenate([newest[None], bank.path[:-1].take(parent, axis=1)])
+    if not isinstance(looked.told, bool):
+        path = np.where(looked.told.take(family), path, bank.path.take(parent, axis=1))
     grown = Bank(
-        at,
-        mean,
-        covariance,
-        weight[some],
-        family[some],
+        bank.at,
+        np.concatenate([bank.mean, pairs.mean], axis=1).take(state, axis=1),
+        np.concatenate([bank.covariance, pairs.covariance], axis=2).take(state, axis=2),
+        weight.take(some),
+        family,
         path,
         existence,
         bank.first,
         bank.number,
-        bank.looks + looked,
+        bank.looks + looked.told,
         bank.confirmed | (existence >= model.confirm_at),
-        looked_at,
+        looked.at,
     )
     return merged(grown)
 
 
-def _with_new(bank: Bank, plots: Plots, unexplained: Floats, at: int, sight: Sight, model: Splitting) -> Bank:
+def _with_new(bank: Bank, plots: Plots, unexplained: Floats, sight: Sight, model: Splitting) -> Bank:
     """The same with a family for every plot that tells a place and that no track explains."""
-    new = np.flatnonzero(unexplained >= NEW_AT)
-    whole, position, scatter = sight.placed(plots.value[:, new], plots.variance[:, new])
+    new = (unexplained >= NEW_AT).nonzero()[0]
+    whole, position, scatter = sight.placed(plots.value.take(new, axis=1), plots.variance.take(new, axis=1))
     new = new if whole.all() else new[whole]
-    axes, rate = len(position), np.arange(len(position), 2 * len(position))
-    mean = np.concatenate([position, np.zeros_like(position)])
-    covariance = np.zeros((2 * axes, 2 * axes, len(new)))
-    covariance[:axes, :axes] = scatter
-    covariance[rate, rate] = (0.5 * np.array(model.greatest_speed_mps)[:, None]) ** 2
-    existence = unexplained[new] * plots.newborn[new] / (plots.newborn[new] + plots.clutter[new])
-    return begun(bank, mean, covariance, plots.serial[new], existence, at)
+    axes, count = position.shape
+    mean, covariance = np.zeros((2 * axes, count)), np.zeros((2 * axes, 2 * axes, count))
+    mean[:axes], covariance[:axes, :axes] = position, scatter
+    for axis, greatest_mps in enumerate(model.greatest_speed_mps, axes):
+        covariance[axis, axis] = (0.5 * greatest_mps) ** 2
+    newborn = plots.newborn.take(new)
+    existence = unexplained.take(new) * newborn / (newborn + plots.clutter.take(new))
+    return begun(bank, mean, covariance, plots.serial.take(new), existence)

@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators.track_splitting_gates import near
+from gateway.estimators.track_splitting_plots import moved
 from gateway.observation import made_swiftly
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+SECOND = 1e9
 PATH = 8  # plots of a hypothesis that are remembered
 ALIKE = 0.25  # hypotheses of a family differ by less than half a sigma in every state: they tell the same
 TWINS = 1.0  # families, by less than a sigma, and by a plot that both took lately
@@ -55,30 +57,61 @@ class Bank:
         return np.searchsorted(self.family, np.arange(len(self.number)))
 
 
-def chosen(bank: Bank, keep: Bools, weight: Floats) -> Bank:
-    """Some of the hypotheses, with new weights that are brought to 1; families without one are gone."""
-    family = bank.family[keep]
-    alive = np.zeros(len(bank.number), np.bool_)
-    alive[family] = True
-    weight = weight[keep]
-    if not alive.all():
-        family = (np.cumsum(alive) - 1)[family]
+def carried(bank: Bank, at: int, density: tuple[float, ...]) -> Bank:
+    """The same at another instant, ns: see `moved`."""
+    mean, covariance = moved(bank.mean, bank.covariance, (at - bank.at) / SECOND, density)
+    return Bank(
+        at,
+        mean,
+        covariance,
+        bank.weight,
+        bank.family,
+        bank.path,
+        bank.existence,
+        bank.first,
+        bank.number,
+        bank.looks,
+        bank.confirmed,
+        bank.looked,
+    )
+
+
+def chosen(bank: Bank, weight: Floats, keep: Ints | None = None) -> Bank:
+    """Some of the hypotheses, None = all, with new weights that are brought to 1; families without one are gone."""
+    family, mean, covariance, path = bank.family, bank.mean, bank.covariance, bank.path
+    if keep is not None:
+        family, weight, path = family.take(keep), weight.take(keep), path.take(keep, axis=1)
+        mean, covariance = mean.take(keep, axis=1), covariance.take(keep, axis=2)
+    begins = np.ones(len(family), np.bool_)
+    np.not_equal(family[1:], family[:-1], out=begins[1:])
+    alive = family[begins]
+    family = begins.cumsum() - 1
     total = np.bincount(family, weight, minlength=1)
-    every = len(weight) == len(keep)
     return Bank(
         bank.at,
-        bank.mean if every else bank.mean[:, keep],
-        bank.covariance if every else bank.covariance[:, :, keep],
-        weight / total[family],
+        mean,
+        covariance,
+        weight / total.take(family),
         family,
-        bank.path if every else bank.path[:, keep],
-        bank.existence[alive],
-        bank.first[alive],
-        bank.number[alive],
-        bank.looks[alive],
-        bank.confirmed[alive],
-        bank.looked[alive],
+        path,
+        bank.existence.take(alive),
+        bank.first.take(alive),
+        bank.number.take(alive),
+        bank.looks.take(alive),
+        bank.confirmed.take(alive),
+        bank.looked.take(alive),
     )
+
+
+def likeliest(weight: Floats, family: Ints, keep: Bools, most: int) -> Ints:
+    """Of what may be kept (n,) the places of each family's likeliest, so many at most, in order of family and of weight."""
+    some = keep.nonzero()[0]
+    family = family.take(some)
+    order = np.lexsort((-weight.take(some), family))
+    some, family = some.take(order), family.take(order)
+    if (family[most:] == family[:-most]).any():
+        some = some[rank(family) < most]
+    return some
 
 
 def rank(family: Ints) -> Ints:
@@ -88,33 +121,36 @@ def rank(family: Ints) -> Ints:
 
 def merged(bank: Bank) -> Bank:
     """Hypotheses that tell nearly the same as their family's likeliest become one with it."""
-    weight, keep = bank.weight, np.ones(len(bank), np.bool_)
-    other = np.flatnonzero(bank.family[1:] == bank.family[:-1]) + 1
-    if len(other):
-        first = other - rank(bank.family)[other]
-        state = np.arange(len(bank.mean))
-        off = bank.mean[:, other] - bank.mean[:, first]
-        same = (off * off <= ALIKE * bank.covariance[state, state][:, first]).all(axis=0)
-        if same.any():
-            keep[other[same]] = False
-            weight = weight + np.bincount(first[same], weight[other[same]], minlength=len(weight))
-    return chosen(bank, keep, weight)
+    other = (bank.family[1:] == bank.family[:-1]).nonzero()[0] + 1
+    if not len(other):
+        return chosen(bank, bank.weight)
+    first = other - rank(bank.family).take(other)
+    state = np.arange(len(bank.mean))
+    off = bank.mean.take(other, axis=1) - bank.mean.take(first, axis=1)
+    same = (off * off <= ALIKE * bank.covariance[state, state].take(first, axis=1)).all(axis=0)
+    if not same.any():
+        return chosen(bank, bank.weight)
+    keep = np.ones(len(bank), np.bool_)
+    keep[other[same]] = False
+    weight = bank.weight + np.bincount(first[same], bank.weight[other[same]], minlength=len(bank))
+    return chosen(bank, weight, keep.nonzero()[0])
 
 
 def distinct(bank: Bank) -> Bank:
     """Without families that follow the same thing as another one that is confirmed, or likelier, or older."""
     best = bank.best
-    mean, axes = bank.mean[:, best], len(bank.mean) // 2
+    mean, axes = bank.mean.take(best, axis=1), len(bank.mean) // 2
     state = np.arange(len(mean))
-    variance = bank.covariance[state, state][:, best]
-    position, reach = mean[:axes], np.sqrt(TWINS * variance[:axes])
+    variance = bank.covariance[state, state].take(best, axis=1)
+    position, reach = mean[:axes], TWINS * variance[:axes]
     one, other = near(position, reach, position, np.zeros_like(reach))
     apart = one != other
     one, other = one[apart], other[apart]
-    path = bank.path[:LATELY, best]
-    same = ((path[:, one] == path[:, other]) & (path[:, one] > 0)).any(axis=0)
-    off = mean[:, one] - mean[:, other]
-    same &= (off * off <= TWINS * variance[:, one]).all(axis=0)
+    off = mean.take(one, axis=1) - mean.take(other, axis=1)
+    same = (off * off <= TWINS * variance.take(one, axis=1)).all(axis=0)
+    path = bank.path[:LATELY].take(best, axis=1)
+    shared = path.take(one, axis=1)
+    same &= ((shared == path.take(other, axis=1)) & (shared > 0)).any(axis=0)
     one, other = one[same], other[same]
     confirmed = bank.confirmed.astype(np.int64)
     order = np.lexsort((bank.number, -bank.existence, -confirmed))
@@ -125,7 +161,7 @@ def distinct(bank: Bank) -> Bank:
         return bank
     gone = np.zeros(len(best), np.bool_)
     gone[worse] = True
-    return chosen(bank, ~gone[bank.family], bank.weight)
+    return chosen(bank, bank.weight, np.logical_not(gone.take(bank.family)).nonzero()[0])
 
 
 def bounded(bank: Bank, budget: int) -> tuple[Bank, int]:
@@ -134,12 +170,11 @@ def bounded(bank: Bank, budget: int) -> tuple[Bank, int]:
     if over <= 0:
         return bank, 0
     standing = bank.existence[bank.family] * bank.weight + bank.confirmed[bank.family]
-    keep = np.zeros(len(bank), np.bool_)
-    keep[np.argsort(-standing, kind="stable")[:budget]] = True
-    return chosen(bank, keep, bank.weight), over
+    keep = np.sort(np.argsort(-standing, kind="stable")[:budget])
+    return chosen(bank, bank.weight, keep), over
 
 
-def begun(bank: Bank, mean: Floats, covariance: Floats, serial: Ints, existence: Floats, at: int) -> Bank:
+def begun(bank: Bank, mean: Floats, covariance: Floats, serial: Ints, existence: Floats) -> Bank:
     """The same with b new families of one hypothesis each: states (2A, b), (2A, 2A, b), plots and likelihoods (b,)."""
     count, families = len(serial), len(bank.number)
     if not count:
@@ -147,7 +182,7 @@ def begun(bank: Bank, mean: Floats, covariance: Floats, serial: Ints, existence:
     path = np.zeros((PATH, count), np.int64)
     path[0] = serial
     return Bank(
-        at,
+        bank.at,
         np.concatenate([bank.mean, mean], axis=1),
         np.concatenate([bank.covariance, covariance], axis=2),
         np.concatenate([bank.weight, np.ones(count)]),
@@ -158,5 +193,5 @@ def begun(bank: Bank, mean: Floats, covariance: Floats, serial: Ints, existence:
         np.concatenate([bank.number, serial]),
         np.concatenate([bank.looks, np.ones(count, np.int64)]),
         np.concatenate([bank.confirmed, np.zeros(count, np.bool_)]),
-        np.concatenate([bank.looked, np.full(count, at)]),
+        np.concatenate([bank.looked, np.full(count, bank.at)]),
     )

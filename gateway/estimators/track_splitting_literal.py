@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gateway.estimators.track_splitting import GATE, IN_GATE, SECOND, TINY, Plots
 from gateway.estimators.track_splitting_gates import near
-from gateway.estimators.track_splitting_plots import Sight, corrected, moved
+from gateway.estimators.track_splitting_plots import Sight, corrected, moved, spread
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -109,16 +109,16 @@ def scan(tracks: Tracks, plots: Plots, at: int, sight: Sight, model: Printed) ->
     mean, covariance = moved(tracks.mean, tracks.covariance, (at - tracks.at) / SECOND, model.acceleration_density)
     expected, slope = sight.measured(mean[:axes])
     gate = GATE[len(expected)]
-    reach = np.sqrt(gate * np.einsum("kan,abn,kbn->kn", slope, covariance[:axes, :axes], slope))
-    row, plot = near(expected, reach, plots.value, np.sqrt(gate * plots.variance))
+    reach = gate * spread(slope, covariance[:axes, :axes])
+    row, plot = near(expected, reach, plots.value, gate * plots.variance)
     off = sight.off(plots.value[:, plot], expected[:, row])
-    slope = slope if slope.shape[2] == 1 else slope[:, :, row]
-    after, scatter, distance, log_density = corrected(
-        mean[:, row], covariance[:, :, row], off, plots.variance[:, plot], slope
+    slope, missing = None if slope is None else slope[:, :, row], np.isnan(off)
+    after, scatter, distance, density = corrected(
+        mean[:, row], covariance[:, :, row], off, plots.variance[:, plot], slope, missing
     )
-    inside = distance <= GATE[len(expected) - np.isnan(off).sum(axis=0)]
+    inside = distance <= GATE[len(expected) - missing.sum(axis=0)]
     row, plot, distance = row[inside], plot[inside], distance[inside]
-    ratio = model.detection * np.exp(log_density[inside]) / plots.clutter[plot]
+    ratio = model.detection * density[inside] / plots.clutter[plot]
     together = 1.0 - model.detection * IN_GATE + np.bincount(row, ratio, minlength=len(tracks.score))
     alone = np.flatnonzero(np.bincount(row, minlength=len(tracks.score)) == 0)
     parent = np.concatenate([row, alone])

@@ -15,10 +15,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-LOG_TAU = float(np.log(2.0 * np.pi))
-
-
-_AXES = {axes: np.eye(axes)[:, :, None] for axes in (2, 3)}
+TAU = 2.0 * np.pi
 
 
 class Sight(Protocol):
@@ -28,8 +25,8 @@ class Sight(Protocol):
     def turn(self) -> float | None:
         """After how much the second component is the same again, if it is an angle all around."""
 
-    def measured(self, position: Floats) -> tuple[Floats, Floats]:
-        """What it would measure of positions (A, n): values (k, n) and their derivatives (k, A, n), or (k, A, 1) if constant."""
+    def measured(self, position: Floats) -> tuple[Floats, Floats | None]:
+        """What it would measure of positions (A, n): values (k, n), and derivatives (k, A, n), None if it measures the axes."""
 
     def off(self, value: Floats, expected: Floats) -> Floats:
         """Differences (k, n) of what was measured and what was expected; angles the short way round."""
@@ -43,9 +40,9 @@ class Plane:
 
     turn: float | None = None
 
-    def measured(self, position: Floats) -> tuple[Floats, Floats]:
+    def measured(self, position: Floats) -> tuple[Floats, None]:
         """The positions themselves."""
-        return position, _AXES[len(position)]
+        return position, None
 
     def off(self, value: Floats, expected: Floats) -> Floats:
         """Their differences."""
@@ -54,10 +51,12 @@ class Plane:
     def placed(self, value: Floats, variance: Floats) -> tuple[Bools, Floats, Floats]:
         """Where all axes are measured."""
         whole: Bools = np.logical_not(np.isnan(value).any(axis=0))
-        axis = np.arange(len(value))
-        covariance = np.zeros((len(value), len(value), int(whole.sum())))
-        covariance[axis, axis] = variance[:, whole]
-        return whole, value[:, whole], covariance
+        if not whole.all():
+            value, variance = value[:, whole], variance[:, whole]
+        axes, count = value.shape
+        covariance = np.zeros((axes, axes, count))
+        covariance.reshape(axes * axes, count)[:: axes + 1] = variance
+        return whole, value, covariance
 
 
 def moved(mean: Floats, covariance: Floats, elapsed_s: float, density: tuple[float, ...]) -> tuple[Floats, Floats]:
@@ -79,51 +78,59 @@ def _noise(elapsed_s: float, density: tuple[float, ...]) -> Floats:
     return noise
 
 
+def along(slope: Floats | None, component: int, parts: Floats) -> Floats:
+    """What parts (A, ...) along the axes are in a measured component; slope (k, A, n), None = the axes themselves."""
+    total: Floats
+    if slope is None:
+        total = parts[component]
+        return total
+    row = slope[component]
+    total = row[0] * parts[0]
+    for axis in range(1, len(row)):
+        total += row[axis] * parts[axis]
+    return total
+
+
+def spread(slope: Floats | None, covariance: Floats) -> Floats:
+    """Variances (k, n) of the measured components, of covariances (A, A, n) along the axes."""
+    if slope is None:
+        return covariance.diagonal().T
+    return np.stack([along(slope, component, along(slope, component, covariance)) for component in range(len(slope))])
+
+
 def corrected(
     mean: Floats,
     covariance: Floats,
     off: Floats,
     variance: Floats,
-    slope: Floats,
+    slope: Floats | None,
+    missing: Bools | None = None,
     lead_s: Floats | None = None,
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """States after a plot each, with the squared distance v' S^-1 v (n,) and the logarithm of the plot's density (n,).
+    """States after a plot each, with the squared distance v' S^-1 v (n,) and the plot's probability density (n,).
 
-    off (k, n): measured less expected, NaN = not measured; variance (k, n); slope (k, A, n or 1); `lead_s` (n,): how much later
-    than the states the plots were measured. A density is of the measured components alone, in their units.
+    off (k, n): measured less expected; variance (k, n); slope as `along`; `missing` (k, n): not measured, None = nothing is;
+    `lead_s` (n,): how much later than the states the plots were measured. A density is of the measured components alone.
     """
-    half = len(mean) // 2
-    before, mean, covariance = mean[:half], mean.copy(), covariance.copy()
-    distance, log_density = np.zeros(off.shape[1]), np.zeros(off.shape[1])
-    missing = np.isnan(off)
-    partial = bool(missing.any())
-    rates = mean[half:].copy() if lead_s is not None else None
-    for component, row in enumerate(slope):
-        cross = row[0] * covariance[:, 0]
-        scatter = variance[component].copy()
-        residual = off[component]
-        for axis in range(1, half):
-            cross += row[axis] * covariance[:, axis]
+    half, before = len(mean) // 2, mean[: len(mean) // 2]
+    distance: Floats | float = 0.0
+    volume: Floats | float = 1.0
+    for component, residual in enumerate(off):
+        cross = along(slope, component, covariance[:half])
+        if component:
+            residual = residual - along(slope, component, mean[:half] - before)
         if lead_s is not None:
-            for axis in range(half):
-                cross += (lead_s * row[axis]) * covariance[:, half + axis]
-        for axis in range(half):
-            scatter += row[axis] * cross[axis]
-            if component:
-                residual = residual - row[axis] * (mean[axis] - before[axis])
-            if lead_s is not None and rates is not None:
-                scatter += (lead_s * row[axis]) * cross[half + axis]
-                residual = residual - (lead_s * row[axis]) * mean[half + axis]
-        gain = cross / scatter
-        square = residual * residual / scatter
-        density = np.log(scatter) + LOG_TAU + square
-        if partial:
-            nothing = missing[component]
-            residual = np.where(nothing, 0.0, residual)
-            gain[:, nothing] = 0.0
-            square, density = np.where(nothing, 0.0, square), np.where(nothing, 0.0, density)
-        mean += gain * residual
-        covariance -= gain[:, None] * cross
-        distance += square
-        log_density -= 0.5 * density
-    return mean, covariance, distance, log_density
+            cross = cross + lead_s * along(slope, component, covariance[half:])
+            residual = residual - lead_s * along(slope, component, mean[half:])
+        scatter = variance[component] + along(slope, component, cross[:half])
+        if lead_s is not None:
+            scatter += lead_s * along(slope, component, cross[half:])
+        gain, scaled = cross / scatter, TAU * scatter
+        if missing is not None and (nothing := missing[component]).any():
+            gain[:, nothing], scaled[nothing] = 0.0, 1.0
+            residual, scatter = np.where(nothing, 0.0, residual), np.where(nothing, 1.0, scatter)
+        distance = distance + residual * residual / scatter
+        volume = volume * scaled
+        mean = mean + gain * residual
+        covariance = covariance - gain[:, None] * cross
+    return mean, covariance, np.asarray(distance), np.exp(-0.5 * distance) / np.sqrt(volume)

@@ -24,20 +24,18 @@ def shared(track: Ints, plot: Ints, weight: Floats, none: Floats, plots: int) ->
     against the plot being clutter. A track has at most one pair with a plot.
     """
     tracks = len(none)
-    free = np.ones(len(track))
     contested = bool(np.bincount(plot, minlength=plots).max(initial=0) > 1)
-    for _ in range(ROUNDS_AT_MOST if contested else 1):
-        open_ = weight * free
+    if not contested:
+        total = none + np.bincount(track, weight, minlength=tracks)
+        claimed = 1.0 + np.bincount(plot, weight / (total.take(track) - weight), minlength=plots)
+        return weight / total.take(track), none / total, np.asarray(1.0 / claimed), False
+    open_ = weight
+    for _ in range(ROUNDS_AT_MOST):
         total = none + np.bincount(track, open_, minlength=tracks)
-        claim = weight / (total[track] - open_)
+        claim = weight / (total.take(track) - open_)
         claimed = 1.0 + np.bincount(plot, claim, minlength=plots)
-        if not contested:
-            return open_ / total[track], none / total, np.asarray(1.0 / claimed), False
-        after = 1.0 / (claimed[plot] - claim)
-        change = np.abs(after - free).max()
-        free = after
-        if change < SETTLED:
+        before, open_ = open_, weight / (claimed.take(plot) - claim)
+        if (np.abs(open_ - before) <= SETTLED * weight).all():
             break
-    open_ = weight * free
     total = none + np.bincount(track, open_, minlength=tracks)
-    return open_ / total[track], none / total, np.asarray(1.0 / claimed), True
+    return open_ / total.take(track), none / total, np.asarray(1.0 / claimed), True

@@ -110,15 +110,15 @@ def _assigned(known: _Nearest, plots: Plots, elapsed_s: float) -> tuple[_Nearest
     from scipy.optimize import linear_sum_assignment
 
     mean, covariance = moved(known.mean, known.covariance, elapsed_s, DENSITY)
-    reach = np.sqrt(GATE * covariance[[0, 1], [0, 1]])
-    row, plot = near(mean[:2], reach, plots.value, np.sqrt(GATE * plots.variance))
+    reach = GATE * covariance[[0, 1], [0, 1]]
+    row, plot = near(mean[:2], reach, plots.value, GATE * plots.variance)
     off = plots.value[:, plot] - mean[:2, row]
-    each_mean, each_covariance, distance, log_density = corrected(
-        mean[:, row], covariance[:, :, row], off, plots.variance[:, plot], np.eye(2)[:, :, None]
+    each_mean, each_covariance, distance, density = corrected(
+        mean[:, row], covariance[:, :, row], off, plots.variance[:, plot], None
     )
     inside = np.flatnonzero(distance <= GATE)
     cost = np.full((len(known.number), len(plots)), 1e3)
-    cost[row[inside], plot[inside]] = -log_density[inside] - 30.0
+    cost[row[inside], plot[inside]] = -np.log(density[inside]) - 30.0
     track, taken = linear_sum_assignment(cost)
     good = cost[track, taken] < 1e3
     track, taken = track[good], taken[good]

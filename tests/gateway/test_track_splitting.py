@@ -108,10 +108,10 @@ def test_the_grid_finds_what_all_with_all_finds(partial: float) -> None:
     """Pairs within reach, by the grid and by comparing everything, are the same and in the same order."""
     random = np.random.default_rng(1)
     expected, value = random.uniform(-1e4, 1e4, (3, 300)), random.uniform(-1e4, 1e4, (3, 400))
-    reach, spread = random.uniform(10.0, 2000.0, (3, 300)), random.uniform(10.0, 300.0, (3, 400))
+    reach, spread = random.uniform(10.0, 2000.0, (3, 300)) ** 2, random.uniform(10.0, 300.0, (3, 400)) ** 2
     value[random.random(value.shape) < partial] = np.nan
     row, plot = near(expected, reach, value, spread)
-    apart = np.abs(expected[:, :, None] - value[:, None, :]) > reach[:, :, None] + spread[:, None, :]
+    apart = (expected[:, :, None] - value[:, None, :]) ** 2 > reach[:, :, None] + spread[:, None, :]
     wanted = np.nonzero(~apart.any(axis=0))
     assert (row == wanted[0]).all()
     assert (plot == wanted[1]).all()
@@ -119,7 +119,7 @@ def test_the_grid_finds_what_all_with_all_finds(partial: float) -> None:
 
 def test_an_angle_is_near_from_both_ends() -> None:
     """Plots just beyond half a turn lie near predictions just before it, each pair once."""
-    expected, reach = np.array([[1000.0, 1000.0], [3.13, 0.0]]), np.full((2, 2), 0.05)
+    expected, reach = np.array([[1000.0, 1000.0], [3.13, 0.0]]), np.full((2, 2), 0.05**2)
     value = np.array([[1000.0, 1000.0, 1000.0], [-3.14, 3.12, 0.01]])
     row, plot = near(expected, reach, value, np.zeros_like(value), 2.0 * np.pi)
     assert list(zip(row.tolist(), plot.tolist(), strict=True)) == [(0, 0), (0, 1), (1, 2)]
@@ -140,18 +140,18 @@ def test_components_one_by_one_are_the_kalman_update() -> None:
     assert m[:, 0] == pytest.approx(mean + gain @ off)
     assert c[:, :, 0] == pytest.approx(covariance - gain @ h @ covariance)
     assert distance[0] == pytest.approx(off @ np.linalg.solve(s, off))
-    assert density[0] == pytest.approx(-0.5 * (distance[0] + np.log(np.linalg.det(2.0 * np.pi * s))))
+    assert density[0] == pytest.approx(np.exp(-0.5 * distance[0]) / np.sqrt(np.linalg.det(2.0 * np.pi * s)))
 
 
 def test_a_missing_component_neither_moves_nor_weighs() -> None:
     """A plot without its second component is the update by the first alone, and its density is of that alone."""
     mean, covariance = np.zeros((4, 1)), 100.0 * np.eye(4)[:, :, None]
-    slope, variance = np.eye(2)[:, :, None], np.full((2, 1), 100.0)
-    m, c, distance, density = corrected(mean, covariance, np.array([[10.0], [np.nan]]), variance, slope)
+    variance, off = np.full((2, 1), 100.0), np.array([[10.0], [np.nan]])
+    m, c, distance, density = corrected(mean, covariance, off, variance, None, np.isnan(off))
     assert m[:, 0] == pytest.approx([5.0, 0.0, 0.0, 0.0])
     assert c[1, 1, 0] == 100.0
     assert distance[0] == pytest.approx(0.5)
-    assert density[0] == pytest.approx(-0.25 - 0.5 * np.log(2.0 * np.pi * 200.0))
+    assert density[0] == pytest.approx(np.exp(-0.25) / np.sqrt(2.0 * np.pi * 200.0))
 
 
 def test_partial_plots_keep_a_track_and_begin_none() -> None:
