@@ -20,11 +20,11 @@ __all__ = ["State", "initial", "step"]
 def step(state: State, heard: Sequence[Heard], health: Health = Health()) -> tuple[State, Picture]:
     """What was heard, worked into the state; and the picture of what came of it.
 
-    Register and predict have their instants, the whole seconds between the arrivals.
+    Register and predict have instants of their own between the arrivals, each once a second.
     """
     work = Work(state, heard)
     for arrival in heard:
-        for at in work.seconds_until(arrival):
+        for at in work.instants_until(arrival):
             work.register(at)
             work.predict(at)
         if not work.takes(arrival):

@@ -18,20 +18,25 @@ from gateway.register import WAIT_NS, gathered, remaining, residuals
 from gateway.track import RadarTracks
 from gateway.tracking import Tracked
 
-QUARTER = SECOND // 4
+EIGHTH = SECOND // 8
+FORGETS, REGISTERS, JUDGES, PROBES, COMPARES, JOINS = 2, 3, 4, 5, 6, 7  # in which eighth of a second what is done
+IDLE = (FORGETS, JUDGES, PROBES, COMPARES, JOINS)  # at a whole second, where there is nothing: they find nothing to do
 PLOT_MARGIN_S = 4.0  # plots are remembered this much longer than reports: a report's check looks back over them
 
 
 class Work(Fusing):
     """The stages of one step; lives only inside `pipeline.step`, which calls them in order for each arrival."""
 
+    _nearby: associate.Nearby | None = None  # the radar tracks as columns, while no plot comes
+
     # what happens by itself ---------------------------------------------------------------------------------------
 
-    def seconds_until(self, arrival: Heard) -> Iterator[int]:
-        """The whole seconds before an arrival, with a watermark also at its very instant.
+    def instants_until(self, arrival: Heard) -> Iterator[int]:
+        """The instants before an arrival at which register or predict have their turn, with a watermark also at its very one.
 
-        What else happens by itself is done on the way: checks that are due before them, in each of them ends and coasting,
-        and at the quarters between them forgetting, judging scatter, and bringing radars together.
+        What else happens by itself is done on the way: checks that are due before them, at each whole second ends and coasting,
+        and at the eighths between them one thing after the other. While there is nothing, seconds are passed over, however many
+        a step brings: nothing may happen then that would be otherwise for more of them.
         """
         now, watermark = arrival.now, not arrival.observations
         if self.now is None or now < self.now - self.history:
@@ -51,25 +56,30 @@ class Work(Fusing):
                     self._live_until(at)
                     yield at
                 is_idle = is_whole and not self.lanes.lanes and self.association.due is None
-                for turn in (1, 2, 3) if is_idle else (at % SECOND // QUARTER,):
+                for turn in IDLE if is_idle else (at % SECOND // EIGHTH,):
                     self._in_turn(turn, at)
-                self.instant = max((now - 1) // SECOND * SECOND, at) + SECOND if is_idle else at + QUARTER
+                if at % SECOND == REGISTERS * EIGHTH:
+                    yield at
+                self.instant = max((now - 1) // SECOND * SECOND, at) + SECOND if is_idle else at + EIGHTH
             due = self._next_check()
         self.now = max(now, self.now or now)
         self.events += [Event(now, level, text) for level, text in arrival.notes]
 
-    def _in_turn(self, quarter: int, at: int) -> None:
+    def _in_turn(self, eighth: int, at: int) -> None:
         """What is done once a second between the whole seconds: of a crowd it would hold up for long what comes, all at once."""
-        if quarter:
+        if eighth in (FORGETS, JUDGES, PROBES, JOINS):
             self._settle()
-        if quarter == 1:
+        if eighth == FORGETS:
             self._forget(at)
-        elif quarter == 2:
+        elif eighth == JUDGES:
             self.consistency = self.consistency.planning(at)
             self._judge(at)
-        elif quarter == 3:
-            self._join_radars(at)
+        elif eighth == PROBES:
             self._probe(at)
+        elif eighth == COMPARES:
+            self._compare_radars(at)
+        elif eighth == JOINS:
+            self._join_radars(at)
 
     def _judge(self, at: int) -> None:
         """What scatters otherwise than stated: of many sources, each share's at its own instant within the second."""
@@ -109,7 +119,8 @@ class Work(Fusing):
                 self.events.append(
                     Event(at, "info", f"radar track {track.name_of(key)}, {aircraft}, has fallen silent")
                 )
-        self.association = associate.pruned(associate.forgotten(self.association, gone), before - WAIT_NS)
+        unlearnt = before - WAIT_NS - SECOND  # register, which takes a second at once, may not have had what came since
+        self.association = associate.pruned(associate.forgotten(self.association, gone), unlearnt)
         self.lanes, doubted = fuse.reviewed(self.lanes, self.association.ledger.spans, self.tracks, at)
         for one in doubted:
             text = f"radar track {track.name_of(one.key)} is {one.aircraft} no more: its reports do not find it there"
@@ -175,7 +186,9 @@ class Work(Fusing):
         """The checks whose wait is over."""
         until = (self.now or 0) - self.wait
         while (fix := self.association.due) is not None and fix.at <= until:
-            after, made = associate.check_due(self.association, until, self.tracks, self.setting)
+            if self._nearby is None or self._nearby.tracks is not self.tracks:
+                self._nearby = associate.Nearby(self.tracks)
+            after, made = associate.check_due(self.association, until, self._nearby, self.setting)
             self.checks += made
             self._move(after)
 
@@ -196,13 +209,20 @@ class Work(Fusing):
             verb = "is" if change.kind == "associated" else "is no longer"
             self.events.append(Event(change.at, "info", f"{change.aircraft} {verb} radar track {change.radar_track}"))
 
-    def _join_radars(self, at: int) -> None:
-        """Radar tracks of several radars that are one target, brought into one system track; and others out of it."""
+    def _compare_radars(self, at: int) -> None:
+        """Which radar tracks of several radars are one target."""
         if len(self.radars) < 2:
             return
         allowed = remaining(self.registration, self.radars, at)
-        state, seen = associate.compared(self.association.together, at, self.tracks, self.radar_frames, allowed)
+        state = associate.compared(self.association.together, at, self.tracks, self.radar_frames, allowed)
         self.association = replace(self.association, together=state)
+
+    def _join_radars(self, at: int) -> None:
+        """Radar tracks that were found to be one target, brought into one system track; and others out of it."""
+        state, seen = self.association.together, self.association.together.seen
+        if seen is None:
+            return
+        self.association = replace(self.association, together=replace(state, seen=None))
         known, found = self._spans, self.association.ledger.spans
         found = fuse.spans_with(found, self.lanes.adopted) if self.lanes.adopted else found
         groups, alive = associate.together(seen.keys, state.one), frozenset(seen.keys)
@@ -212,6 +232,7 @@ class Work(Fusing):
             self.lanes = done.lanes
             self._reroute(known, at)
         theirs = fuse.radar_tracks_of_aircraft(self.lanes, self._spans, seen.keys)
+        allowed = remaining(self.registration, self.radars, at)
         self.of_radars.append(associate.combined(seen, theirs, allowed, self.frame))
 
     # register -----------------------------------------------------------------------------------------------------
@@ -219,7 +240,7 @@ class Work(Fusing):
     def register(self, at: int) -> None:
         """What pairs that leave the history tell of the radars' errors; a step further in what align takes off."""
         use = self.options.registration
-        if use == "off":
+        if use == "off" or at % SECOND != REGISTERS * EIGHTH:
             return
         until, known = at - self.history - WAIT_NS, self.registration.learnt_until
         spans = self.association.ledger.spans
@@ -235,7 +256,7 @@ class Work(Fusing):
     def predict(self, at: int) -> None:
         """Where every track will be: of many, each part's at its own instant within the second."""
         alive = self._alive()
-        if alive and at % int(self.options.prediction_period_s * SECOND) == 0:
+        if alive and at % SECOND == 0 and at % int(self.options.prediction_period_s * SECOND) == 0:
             self.predicting = self.predicting.planning([lane.track for lane in alive], at)
             self._foretell(at)
 

@@ -24,7 +24,7 @@ from gateway.associate.checks import (
     table,
 )
 from gateway.associate.combining import MultiRadar, combined
-from gateway.associate.gates import SILENT_S, Comparison, Setting
+from gateway.associate.gates import SILENT_S, Comparison, Nearby, Setting
 from gateway.associate.joining import Together, compared, together
 from gateway.associate.ledger import Change, Count, Ledger, Span, Spans, aircraft_of, ordinal_of
 from gateway.associate.pairing import Systematic
@@ -39,6 +39,7 @@ __all__ = [
     "Count",
     "Ledger",
     "MultiRadar",
+    "Nearby",
     "Setting",
     "Span",
     "Spans",

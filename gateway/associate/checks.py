@@ -103,13 +103,13 @@ def _validity(fix: Fix) -> tuple[int, str]:
     return fix.at, fix.aircraft
 
 
-def check_due(state: Association, until: int, tracks: RadarTracks, setting: Setting) -> tuple[Association, list[Check]]:
+def check_due(state: Association, until: int, near: Nearby, setting: Setting) -> tuple[Association, list[Check]]:
     """The same with the waiting reports up to an instant checked, up to the first that makes, ends or moves a pair.
 
     And the checks that were made. A report goes wherever among the checks its validity belongs.
     """
     made: list[Check] = []
-    spans, near = state.ledger.spans, Nearby(tracks)
+    spans = state.ledger.spans
     before, behind, ledger, done = state.checks, list[Check](), state.ledger, 0
     for fix in state.waiting:
         if fix.at > until or ledger.spans != spans:

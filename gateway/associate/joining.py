@@ -22,6 +22,7 @@ class Together:
 
     counts: Mapping[Pair, int] = field(default_factory=dict)
     one: frozenset[Pair] = frozenset()
+    seen: Tracklets | None = None  # what was compared just now, until it is used
 
 
 def compared(
@@ -30,8 +31,8 @@ def compared(
     tracks: RadarTracks,
     radars: Mapping[int, RadarFrame],
     systematic: Mapping[int, Systematic],
-) -> tuple[Together, Tracklets]:
-    """The state after the check of one instant, and the radar tracks that took part in it.
+) -> Together:
+    """The state after the check of one instant.
 
     `systematic`: 1 sigma of what radars may still be off by, of those of which it is known.
     """
@@ -49,7 +50,7 @@ def compared(
             counts[pair] = min(counts.get(pair, 0) + 1, FAST_HITS) if hit else max(counts.get(pair, 0) - 1, 0)
     counts = {pair: value for pair, value in counts.items() if value}
     kept = frozenset(pair for pair in state.one if pair in counts)
-    return Together(counts, _made(kept, counts, alive)), seen
+    return Together(counts, _made(kept, counts, alive), seen)
 
 
 def _made(one: frozenset[Pair], counts: Mapping[Pair, int], alive: frozenset[Key]) -> frozenset[Pair]:

@@ -94,7 +94,7 @@ class Registration:
         after, said = self, list[Said]()
         if pairs is not None:
             after, said = after._learning(pairs, radars, at)
-        if at % SOLVED_EACH_NS == 0 and after.is_new:
+        if at // SECOND * SECOND % SOLVED_EACH_NS == 0 and after.is_new:
             after, more = after._solving(radars, position, use, at)
             said += more
         if after.choices:

@@ -198,7 +198,7 @@ def checks(heard: Measures, setting: associate.Setting, until_s: float) -> Itera
             if first < last:
                 near[key] = plots[first:last]
         tracks = RadarTracks(near, _places(near))
-        state, _ = associate.check_due(associate.await_plots(state, fix), fix.at, tracks, setting)
+        state, _ = associate.check_due(associate.await_plots(state, fix), fix.at, associate.Nearby(tracks), setting)
         state = associate.pruned(state, fix.at - 10 * SECOND)
         yield state, fix
 

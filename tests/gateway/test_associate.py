@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gateway.associate import Association, Change, Setting, await_plots, check_due
+from gateway.associate import Association, Change, Nearby, Setting, await_plots, check_due
 from gateway.observation import GpsReport, RadarPlot
 from gateway.settings import Options
 from gateway.track import RadarTracks
@@ -50,7 +50,7 @@ def _checked(world: Any, fixes: Iterable[Any], plots: Iterable[Any], **options: 
     for fix in sorted(fixes, key=lambda fix: fix.at):
         state = await_plots(state, fix)
         if state.due is not None:
-            state, _ = check_due(state, fix.at, tracks, setting)
+            state, _ = check_due(state, fix.at, Nearby(tracks), setting)
     return _Told(state)
 
 

@@ -118,3 +118,17 @@ def test_watching_only_changes_no_track(there: Any, said: list[Observation]) -> 
     assert off.bits() == watch.bits()
     assert watch.said("radar 1: azimuth: +0.")
     assert not off.said("radar 1: azimuth")
+
+
+@pytest.mark.parametrize("phase_s", [0.05, 0.3, 0.55, 0.8])
+def test_every_pair_is_learnt_from_whenever_in_its_second_the_report_was(there: Any, phase_s: float) -> None:
+    """Nothing is forgotten before register has had it: each checked report that left the history is a pair."""
+    course = there.Course(-9e3, 900.0, 900.0)
+    reports = [there.report(course, second + phase_s, late_s=0.2) for second in range(20)]
+    plots = [there.radar_plot(course, 0.4 * scan) for scan in range(50)]
+    ran = there.run([*reports, *plots], options=SOON, until_s=20.0)
+    learnt = [int(at) for picture in ran.pictures for at in picture.register.residuals.time]
+    (since,) = (change.at for picture in ran.pictures for change in picture.associate.changes)
+    gone = [one.valid_at for one in reports if since <= one.valid_at < there.at(20.0 - 3.0 - 1.5 - 1.0)]
+    assert len(gone) > 5
+    assert learnt[: len(gone)] == gone
