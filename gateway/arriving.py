@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 
 from gateway import align
 from gateway.align import Fix, Geoid, Plot
-from gateway.making import NAMED_AT_MOST, Making
+from gateway.believing import Believing
+from gateway.making import NAMED_AT_MOST
 from gateway.observation import AirData, FlightPlan, GpsReport, Heard, Intent, RadarPlot, RadarStatus, Timing
 from gateway.state import State
 
@@ -16,7 +17,7 @@ STAGED = (GpsReport, RadarPlot, RadarStatus)
 FORETELLING = (FlightPlan, Intent, AirData)  # they tell predict where an aircraft is going, and the wind
 
 
-class Arriving(Making):
+class Arriving(Believing):
     """A step whose arrivals are aligned."""
 
     def __init__(self, state: State, heard: Sequence[Heard]) -> None:
@@ -26,6 +27,8 @@ class Arriving(Making):
     def takes(self, arrival: Heard) -> bool:
         """Whether a stage before predict reads any of it; attitudes and inertial samples pass by, for the sinks."""
         staged = False
+        if self.options.dead_reckoning == "on":
+            self._hear_motion(arrival)
         for observation in arrival.observations:
             if isinstance(observation, STAGED):
                 staged = True
@@ -47,8 +50,8 @@ class Arriving(Making):
                 if fix.has_height:
                     self._judge_heights()
                 timely = observation.timing is not Timing.FOREIGN and self._is_timely(fix.at, fix.aircraft)
-                if timely and self._has_room(fix.aircraft):
-                    fixes.append(fix)
+                if timely and self._has_room(fix.aircraft) and (taken := self._believed(fix, observation)) is not None:
+                    fixes.append(taken)
             elif isinstance(observation, RadarPlot):
                 plot = self._placed_plot(observation)
                 if plot is not None and self._is_timely(plot.at, f"radar {plot.radar}"):

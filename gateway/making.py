@@ -15,6 +15,7 @@ from gateway.fuse.rows import Row
 from gateway.fuse.weighting import Model
 from gateway.observation import Heard, Truth
 from gateway.picture import Event, Health, Picture, SourceHealth
+from gateway.reckon import Reckoned
 from gateway.register import Residuals
 from gateway.state import State
 
@@ -33,7 +34,7 @@ class Making:
         self.now, self.instant, self.serial = state.now, state.instant, state.serial
         self.counters, self.said, self.reported = dict(state.counters), state.said, state.reported
         self.consistency, self.predicting = state.consistency, state.predicting
-        self.unnumbered, self.probing = state.unnumbered, state.probing
+        self.unnumbered, self.probing, self.reckoners = state.unnumbered, state.probing, state.reckoners
         self.history = int(state.options.history_s * SECOND)
         self.wait = int(state.options.association_wait_s * SECOND)
         self.events: list[Event] = []
@@ -54,6 +55,7 @@ class Making:
         self._both: tuple[Spans, tuple[Adopted, ...], tuple[Joint, ...], Spans] = (Spans(), (), (), Spans())
         self.untracked = 0
         self.looks: list[track.Look] = []
+        self.reckoned: list[Reckoned] = []
 
     def _work_in(self, lanes: Lanes, job: Job | None) -> None:
         """A job, to be worked together with those of other tracks."""
@@ -135,6 +137,7 @@ class Making:
             self.predicting,
             self.unnumbered,
             self.probing,
+            self.reckoners,
         )
         observations = tuple(observation for arrival in self.heard for observation in arrival.observations)
         own = SourceHealth("gateway", "pipeline", 0.0, 0.0, 0, tuple(sorted(self.counters.items())))

@@ -11,6 +11,7 @@ from gateway.frames import RunwayFrame
 from gateway.fuse import Lanes
 from gateway.fuse.consistency import Consistency
 from gateway.predict import Predicting, Probing
+from gateway.reckon import Reckoners
 from gateway.register import Registration, Remembered
 from gateway.settings import Options, RadarSite, Site
 from gateway.track import RadarTracks, Unnumbered
@@ -40,6 +41,7 @@ class State:
     predicting: Predicting = Predicting()  # what aircraft say of their plans, and what is thought of each
     unnumbered: Unnumbered = Unnumbered()  # plots without a number, and what they are thought to be
     probing: Probing = Probing()  # which tracks are foretold to come near each other
+    reckoners: Reckoners = Reckoners()  # of vehicles that tell how they move
 
     def to_remember(self, at: int) -> Remembered | None:
         """What is known of the radars' errors, for the next session of this site; None where nothing is."""

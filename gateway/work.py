@@ -10,10 +10,10 @@ from gateway.align import SECOND, Fix
 from gateway.associate import Association
 from gateway.fuse import Lane
 from gateway.fuse.consistency import Finding
-from gateway.fusing import Fusing
 from gateway.making import NAMED_AT_MOST
 from gateway.observation import Heard
 from gateway.picture import Event
+from gateway.reckoning import Reckoning
 from gateway.register import WAIT_NS, gathered, remaining, residuals
 from gateway.track import RadarTracks
 from gateway.tracking import Tracked
@@ -24,7 +24,7 @@ IDLE = (FORGETS, JUDGES, PROBES, COMPARES, JOINS)  # at a whole second, where th
 PLOT_MARGIN_S = 4.0  # plots are remembered this much longer than reports: a report's check looks back over them
 
 
-class Work(Fusing):
+class Work(Reckoning):
     """The stages of one step; lives only inside `pipeline.step`, which calls them in order for each arrival."""
 
     _nearby: associate.Nearby | None = None  # the radar tracks as columns, while no plot comes
@@ -53,6 +53,7 @@ class Work(Fusing):
             self._check_due()
             if at == self.instant:
                 if is_whole := at % SECOND == 0:
+                    self._reckon(at)
                     self._live_until(at)
                     yield at
                 is_idle = is_whole and not self.lanes.lanes and self.association.due is None
@@ -98,7 +99,7 @@ class Work(Fusing):
         self.lived += lived
         self.events += [Event(at, "info", text) for one in lived if (text := fuse.sentence(one, lanes)) is not None]
         self.lanes = lanes
-        silent = [lane for lane in self._alive() if lane.coasting_at(at, self.options)]
+        silent = [lane for lane in self._alive() if lane.last.at < at and lane.coasting_at(at, self.options)]
         self.rows += fuse.coast(silent, at, self._spans, self.geoid.separation_m, self.model)
 
     def _alive(self) -> list[Lane]:
@@ -149,6 +150,7 @@ class Work(Fusing):
         self.ended += ended
         self.tracks, self.association = RadarTracks(), Association()
         self.unnumbered = self.unnumbered.emptied()
+        self.reckoners = self.reckoners.emptied()
         self.registration = self.registration.again(now)
         self.predicting, self.probing = self.predicting.planning((), now), predict.Probing()
         self.consistency = self.consistency.again()

@@ -9,7 +9,7 @@ Positions of reports and plots become `Fix` and `Plot`: metres at the runway cen
 from gateway.align.between import bracket
 from gateway.align.drawing import Aligned, draw
 from gateway.align.plots import SECOND, Correction, Plot, Polar, contradiction, place_plot, radar_from_status
-from gateway.align.reports import Fix, Geoid, Local, place_reports
+from gateway.align.reports import Fix, Geoid, Local, ReckonedFix, place_reports
 
 __all__ = [
     "SECOND",
@@ -20,6 +20,7 @@ __all__ = [
     "Local",
     "Plot",
     "Polar",
+    "ReckonedFix",
     "bracket",
     "contradiction",
     "draw",

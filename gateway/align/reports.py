@@ -64,6 +64,13 @@ class Fix:
         return self.local is None or self.local.has_height
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ReckonedFix(Fix):
+    """Where dead reckoning has an aircraft: the track's state is this, whatever it was before."""
+
+    is_forced: bool = False  # because what came before was false, not because nothing came
+
+
 @dataclass(frozen=True, slots=True)
 class Geoid:
     """The geoid's height above the ellipsoid here: the site's word, else the median of what the streams gave, else 0."""

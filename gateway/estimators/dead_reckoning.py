@@ -78,9 +78,17 @@ def started(
 
 
 def carried_on(
-    state: Reckoning, rate_radps: ArrayLike, force_mps2: ArrayLike, interval_s: ArrayLike, unit: Unit = Unit()
+    state: Reckoning,
+    rate_radps: ArrayLike,
+    force_mps2: ArrayLike,
+    interval_s: ArrayLike,
+    unit: Unit = Unit(),
+    more: tuple[Floats, Floats] | None = None,
 ) -> Reckoning:
-    """One interval later, of its mean angular rate and specific force (..., 3) as the unit measured them."""
+    """One interval later, of its mean angular rate and specific force (..., 3) as the unit measured them.
+
+    `more`: noises of rate and force (..., 3) in a root Hz, along the body, beyond the unit's.
+    """
     step = np.broadcast_to(np.asarray(interval_s, dtype=np.float64), np.shape(state.motion.height_m))
     rate = np.asarray(rate_radps, dtype=np.float64) - state.rate_bias_radps
     force = np.asarray(force_mps2, dtype=np.float64) - state.force_bias_mps2
@@ -98,6 +106,11 @@ def carried_on(
     covariance = across @ state.covariance @ np.swapaxes(across, -1, -2)
     covariance[..., range(STATES), range(STATES)] += _shaken(unit) * step[..., None]
     covariance[..., range(3), range(3)] += unit.force_noise**2 * step[..., None] ** 3 / 3.0
+    if more is not None:
+        for part, noise in ((ATTITUDE, more[0]), (VELOCITY, more[1])):
+            covariance[..., part, part] += (body * (noise**2 * step[..., None])[..., None, :]) @ np.swapaxes(
+                body, -1, -2
+            )
     return replace(state, motion=motion, covariance=covariance)
 
 
@@ -122,6 +135,11 @@ def with_place(
 def with_velocity(state: Reckoning, velocity_mps: ArrayLike, sigma_mps: ArrayLike) -> tuple[Reckoning, Innovation]:
     """With a velocity over the ground (..., 3) north, east, down; nought for what stands still."""
     return _with(state, np.asarray(velocity_mps) - state.motion.velocity_mps, _EYE[VELOCITY], sigma_mps)
+
+
+def with_measured(state: Reckoning, off: ArrayLike, sigma: ArrayLike) -> Reckoning:
+    """With place and velocity that are off by so much (..., 6) m and m/s, north, east, down; sigmas (..., 6)."""
+    return _with(state, np.asarray(off, dtype=np.float64), _EYE[:6], sigma)[0]
 
 
 def with_attitude(state: Reckoning, attitude: Floats, sigma_rad: ArrayLike) -> tuple[Reckoning, Innovation]:

@@ -75,6 +75,11 @@ class Event:
         return self.measure.at
 
     @property
+    def heard_at(self) -> int:
+        """When a source last saw the track; dead reckoning is none."""
+        return max(self.gps_at, self.radar_at)
+
+    @property
     def mixture(self) -> Mixture | None:
         """The modes' states, where the estimator has modes; mean and covariance are then their mixture's."""
         return self.belief if isinstance(self.belief, Mixture) else None

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.align import SECOND, Fix, Plot
+from gateway.align import SECOND, Fix, Plot, ReckonedFix
 from gateway.estimators.kalman import Estimate
 from gateway.fuse.agreement import score_after
 from gateway.fuse.diverging import (
@@ -26,6 +26,7 @@ from gateway.fuse.diverging import (
 from gateway.fuse.estimating import Estimator, Group, InteractingModels, SingleModel, stacked
 from gateway.fuse.events import NEVER, Belief, Event, Job, Measure, Near, Neighbour, Residual, rank
 from gateway.fuse.light import LightFilter
+from gateway.fuse.resuming import resumed
 from gateway.fuse.weighting import Model
 
 __all__ = ["NEVER", "Event", "Job", "Measure", "Near", "Neighbour", "carried_on", "directions", "rank", "run"]
@@ -76,6 +77,9 @@ def _advance(
     events: dict[int, Event] = {}
     groups: dict[tuple[str, int], list[tuple[int, Event, Measure, Measure, Near | None]]] = {}
     for row, (base, measure) in enumerate(zip(bases, measures, strict=True)):
+        if isinstance(measure, ReckonedFix):
+            events[row] = resumed(base, measure, estimator, model)
+            continue
         if base is None:
             first, belief = estimator.begin(measure)
             nothing = np.full((model.memory, 3), np.nan)

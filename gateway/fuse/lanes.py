@@ -80,7 +80,7 @@ class Lane:
 
     def coasting_at(self, at: int, options: Options) -> bool:
         """Whether it has been silent for longer than its own rhythm explains."""
-        silence = at - self.last.at
+        silence = at - self.last.heard_at
         return silence > max(int(options.coast_after_s * SECOND), min(self.last.interval, 20 * SECOND) * 5 // 2)
 
 

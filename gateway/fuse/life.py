@@ -61,7 +61,7 @@ def told(lanes: Lanes, at: int, options: Options) -> tuple[Lanes, list[LifeChang
         if life == "confirmed":
             changes.append(_confirmed(lane))
         elif life == "coasting":
-            silence_s = (at - lane.last.at) / SECOND
+            silence_s = (at - lane.last.heard_at) / SECOND
             changes.append(LifeChange(at, lane.number, life, f"nothing for {silence_s:.0f} s"))
         elif lane.told:
             changes.append(LifeChange(at, lane.number, life, "in hindsight its measurements do not agree"))
@@ -72,7 +72,7 @@ def told(lanes: Lanes, at: int, options: Options) -> tuple[Lanes, list[LifeChang
 def _confirmed(lane: Lane) -> LifeChange:
     """Confirmed for the first time, or heard again."""
     if lane.told == "coasting":
-        gap_s = max((b.at - a.at for a, b in zip(lane.events, lane.events[1:], strict=False)), default=0) / SECOND
+        gap_s = max((b.at - a.heard_at for a, b in zip(lane.events, lane.events[1:], strict=False)), default=0) / SECOND
         return LifeChange(lane.last.at, lane.number, "confirmed", f"heard again after {gap_s:.0f} s")
     first = next(event for event in lane.events if event.score == CONFIRMED)
     return LifeChange(first.at, lane.number, "confirmed", "its measurements agree")

@@ -13,7 +13,7 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from gateway.align import SECOND, Fix, Plot, bracket
+from gateway.align import SECOND, Fix, Plot, ReckonedFix, bracket
 from gateway.associate import Spans, aircraft_of, ordinal_of
 from gateway.fuse.filtering import Job, Measure, Near, Neighbour, rank
 from gateway.fuse.lanes import Lane, Lanes, contains
@@ -135,7 +135,8 @@ def _inserted(lanes: Lanes, lane: Lane, measure: Measure, scene: Scene) -> tuple
         place -= 1
     if place == 0 and events and (not lane.whole or isinstance(measure, Plot)):
         return lanes, None
-    following: list[Measure] = [measure, *(event.measure for event in events[place:])]
+    until = measure.at + int(scene.options.coast_after_s * SECOND)
+    following: list[Measure] = [measure, *(e.measure for e in events[place:] if not _is_moot(e.measure, until))]
     if scene.options.weighting == "literal" and isinstance(measure, Plot):
         # A report shortly before this plot was fused with an interpolation that this plot changes.
         first = measure.at - int(scene.options.association_wait_s * SECOND)
@@ -146,6 +147,11 @@ def _inserted(lanes: Lanes, lane: Lane, measure: Measure, scene: Scene) -> tuple
         place = touched
     job = Job(lane.track, events[place - 1] if place else None, following, scene.neighbour(lane), measure.serial)
     return lanes.with_lane(lane.with_events(events[:place])), job
+
+
+def _is_moot(measure: Measure, until: int) -> bool:
+    """Whether dead reckoning has led the track only because something that was heard late was not there yet."""
+    return isinstance(measure, ReckonedFix) and not measure.is_forced and measure.at <= until
 
 
 def _rebuilt(lanes: Lanes, lane: Lane, at: int, scene: Scene) -> tuple[Lanes, Job | None]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.align import SECOND, Fix
+from gateway.align import SECOND, Fix, ReckonedFix
 from gateway.associate import Spans
 from gateway.estimators.kalman import ERROR, POSITION, SIZE, VELOCITY
 from gateway.frames import RunwayFrame, turn
@@ -39,7 +39,7 @@ class Fused:
     track: Ints  # (n,)
     aircraft: tuple[str | None, ...]
     radar_track: tuple[str | None, ...]  # "1/3", several with a space between
-    updated_by: tuple[str, ...]  # "gps", "radar", "coast"
+    updated_by: tuple[str, ...]  # "gps", "radar", "coast", "dead-reckoning"
     state: tuple[str, ...]  # "gps only", "radar only", "fused", "coasting"
     latitude_rad: Floats
     longitude_rad: Floats
@@ -79,10 +79,11 @@ class Row:
 
 def row_of(lane: Lane, event: Event, spans: Spans, separation_m: float, model: Model) -> Row:
     """The row that an event of a lane writes."""
-    by = "gps" if isinstance(event.measure, Fix) else "radar"
+    is_reckoned = isinstance(event.measure, ReckonedFix)
+    by = "dead-reckoning" if is_reckoned else "gps" if isinstance(event.measure, Fix) else "radar"
     within = int(SEEN_WITHIN_S * SECOND)
     gps, radar = event.at - event.gps_at <= within, event.at - event.radar_at <= within
-    state = "fused" if gps and radar else "gps only" if gps else "radar only"
+    state = "coasting" if is_reckoned else "fused" if gps and radar else "gps only" if gps else "radar only"
     names = radar_names(lane, spans, event.at)
     received = event.measure.received_at
     return Row(
@@ -98,7 +99,7 @@ def row_of(lane: Lane, event: Event, spans: Spans, separation_m: float, model: M
         separation_m,
         event,
         directions(event, model),
-        "confirmed" if event.score == CONFIRMED else "tentative",
+        "tentative" if event.score != CONFIRMED else "coasting" if is_reckoned else "confirmed",
     )
 
 
@@ -113,7 +114,8 @@ def work(
         lane = lanes.lanes[job.track]
         changed[lane.track] = lane.with_events((*lane.events, *events))
         rows += [row_of(lane, event, spans, separation_m, model) for event in events]
-        fresh += [(lane.number, event) for event in events if event.measure.serial == job.fresh]
+        heard = [event for event in events if event.measure.serial == job.fresh]
+        fresh += [(lane.number, event) for event in heard if not isinstance(event.measure, ReckonedFix)]
     return lanes.with_lanes(changed), rows, fresh
 
 

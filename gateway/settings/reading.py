@@ -173,6 +173,7 @@ _TABLES: dict[str, _Table] = {
             "accelerometer_bias_mps2": ("accelerometer_bias_mps2", _number(1e-5, 10.0)),
             "accelerometer_bias_wanders_mps2": ("accelerometer_bias_wanders", _number(0.0, 1.0)),
             "attitude_sigma_deg": ("attitude_sigma_rad", _number(0.01, 45.0, scale=_RAD)),
+            "attitude_wanders_deg": ("attitude_wanders", _number(0.0, 10.0, scale=_RAD)),
             "airspeed_sigma_mps": ("airspeed_sigma_mps", _number(0.01, 100.0)),
             "sideslip_sigma_mps": ("sideslip_sigma_mps", _number(0.01, 100.0)),
             "wind_mps": ("wind_mps", _number(0.1, 100.0)),
@@ -283,9 +284,14 @@ def parse_site(text: str, name: str = "site file") -> Site:
         radars=radars,
         decision_points=tuple(DecisionPoint(**row) for row in rows("decision_point")),
         waypoints=tuple(Waypoint(**row) for row in rows("waypoint")),
-        weather=tuple(_weather(row, name) for row in rows("weather")),
+        weather=read_weather(document, text, name),
         units=(rows("display") or [{}])[0].get("units", "si"),
     )
+
+
+def read_weather(document: Mapping[str, Any], text: str, name: str) -> tuple[Weather, ...]:
+    """The areas of a document that was read from a text. Raises SiteError."""
+    return tuple(_weather(row, name) for row in _read_table(document, "weather", text, name))
 
 
 def _weather(row: dict[str, Any], name: str) -> Weather:

@@ -117,6 +117,7 @@ class DeadReckoning:
     accelerometer_bias_mps2: float = 0.2
     accelerometer_bias_wanders: float = 1e-3  # m/s2
     attitude_sigma_rad: float = math.radians(1.0)  # of an autopilot's roll and pitch; its heading is twice as bad
+    attitude_wanders: float = math.radians(0.1)  # rad: what these errors change by
     airspeed_sigma_mps: float = 0.7
     sideslip_sigma_mps: float = 1.0
     wind_mps: float = 10.0  # before anything is known of it

@@ -144,6 +144,7 @@ def _dead_reckoning(chosen: DeadReckoning) -> list[str]:
             degree,
             "of roll and pitch that autopilots tell; heading twice that",
         ),
+        ("attitude_wanders_deg", "attitude_wanders", degree, "in a root second"),
         ("airspeed_sigma_mps", "airspeed_sigma_mps", 1.0, ""),
         ("sideslip_sigma_mps", "sideslip_sigma_mps", 1.0, ""),
         ("wind_mps", "wind_mps", 1.0, "before anything is known of it"),

@@ -1,0 +1,125 @@
+"""Whether a vehicle's position source is to be believed: what inertial data deny is refused until it agrees again.
+
+A position, or a velocity, is compared with where the vehicle can be. The hypothesis that was corrected until a second ago
+denies what jumps; those that went on without it for ten to thirty seconds deny what walks off slowly. Either must be sure:
+six sigma of what they know and of what the source usually scatters by, and once more what good sources wander by.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.estimators import dead_reckoning as dr
+from gateway.estimators.dead_reckoning import Reckoning
+from gateway.estimators.inertial import between
+from gateway.reckon.cells import SECOND_CELLS
+from gateway.reckon.tip import BRANCHES, JUMPED, NOTHING, WALKED_OFF, Tip, hypothesis, with_each, with_hypothesis
+from gateway.settings import DeadReckoning
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+FAR = 36.8  # chi-square of two degrees, passed once in 10^8: of ten hours with four tests a second one in a thousand is
+NEAR = 9.2  # and once in a hundred
+AGREES_FOR = 5  # positions in a row, a second apart, until one that was refused is believed
+TRUSTED_AFTER = 30 * SECOND_CELLS  # since it began: before that it has not learnt its own errors
+OLD_ENOUGH = 4 * SECOND_CELLS  # a hypothesis without GPS that denies
+WANDERS_M, WANDERS_MPS = 2.0, 0.3  # what good sources' errors change by within half a minute
+LEAST_M, LEAST_MPS = 0.5, 0.1  # of the scatter that a source is taken to have
+MOST_TIMES = 10.0  # the least, or what is stated if that is more: no source is taken to scatter by more
+LEARNS = 0.05  # of each position, for the scatter
+LASTS = 2.0  # how many positions in a row a source's error is the same for, about
+
+
+def judged(tip: Tip, place: Floats, late_s: Floats, settings: DeadReckoning) -> Tip:
+    """The tips with a position each (n, 9), see `told.PLACE`, told so long (n,) before; refused ones are not worked in."""
+    motion = tip.state.motion
+    late = late_s[:, None, None]
+    told = (place[:, None, column] for column in range(3))
+    height = np.where(np.isnan(place[:, None, 2]), motion.height_m, place[:, None, 2])
+    latitude, longitude, _ = told
+    off = between(latitude, longitude, height, motion) + motion.velocity_mps * late
+    faster = place[:, None, 3:6] + tip.accelerated_mps2[:, None] * late - motion.velocity_mps
+    by_place = _square(off[..., :2], tip.state.covariance[..., 0:2, 0:2], tip.scatter_m2, WANDERS_M)
+    by_speed = _square(faster[..., :2], tip.state.covariance[..., 3:5, 3:5], tip.scatter_mps2, WANDERS_MPS)
+    by_speed = np.where(np.isnan(by_speed), 0.0, by_speed)
+    worst = np.maximum(by_place, by_speed)
+    trusted = (tip.cell - tip.began >= TRUSTED_AFTER) & np.array(settings.refuses)
+    jumps = trusted & (worst[:, 0] > FAR)
+    old = tip.cell[:, None] - tip.seeded[:, 1:] >= OLD_ENOUGH
+    walks = trusted[:, None] & old & (worst[:, 1:] > FAR)
+    refused = tip.denied != NOTHING
+    agreed = np.where(refused & (worst[:, 0] < NEAR), tip.agreed + 1, 0)
+    returns = refused & (agreed >= AGREES_FOR)
+    newly = ~refused & (jumps | walks.any(axis=1))
+    why = np.where(jumps, JUMPED, WALKED_OFF)
+    denied = np.where(newly, why, np.where(refused & ~returns, tip.denied, NOTHING))
+    state = _of_the_oldest(tip, walks, newly & ~jumps)
+    tip = replace(tip, state=state, denied=denied, agreed=agreed)
+    accepted = np.flatnonzero(denied == NOTHING)
+    if not len(accepted):
+        return tip
+    return tip.put(accepted, _worked_in(tip.taken(accepted), off[accepted, 0], faster[accepted, 0], place[accepted]))
+
+
+def _square(off: Floats, known: Floats, scatter: Floats, wanders: float) -> Floats:
+    """Squared Mahalanobis distances (n, h) of level vectors (n, h, 2)."""
+    more = (np.maximum(scatter, 0.0) + wanders**2)[:, None]
+    a, b, c = known[..., 0, 0] + more, known[..., 0, 1], known[..., 1, 1] + more
+    x, y = off[..., 0], off[..., 1]
+    return np.asarray((c * x * x - 2.0 * b * x * y + a * y * y) / (a * c - b * b))
+
+
+def _of_the_oldest(tip: Tip, walks: Bools, which: Bools) -> Reckoning:
+    """Where only hypotheses without GPS deny it, the oldest of those is what all go on with: it was led astray least."""
+    rows = np.flatnonzero(which)
+    if not len(rows):
+        return tip.state
+    age = np.where(walks[rows], tip.seeded[rows, 1:], np.iinfo(np.int64).max)
+    best = 1 + np.argmin(age, axis=1)
+    sure = with_each(lambda one: one[rows, best], tip.state)
+
+    def changed(whole: NDArray[Any], part: NDArray[Any]) -> NDArray[Any]:
+        whole = whole.copy()
+        for one in range(1 + BRANCHES):
+            whole[rows, one] = part
+        return whole
+
+    return with_each(changed, tip.state, sure)
+
+
+def _worked_in(tip: Tip, off: Floats, faster: Floats, place: Floats) -> Tip:
+    """The tips with a position each worked into their first hypotheses; what it was off by (n, 3), and its velocity."""
+    stated_m, upright_m, stated_mps = place[:, 6], place[:, 7], place[:, 8]
+    has_velocity = ~np.isnan(faster[:, 0])
+    scatter_m2, sigma_m = _scatter(tip.scatter_m2, off, stated_m, LEAST_M)
+    found, sigma_mps = _scatter(tip.scatter_mps2, np.nan_to_num(faster), stated_mps, LEAST_MPS)
+    scatter_mps2 = np.where(has_velocity, found, tip.scatter_mps2)
+    upright = np.where(np.isnan(place[:, 2]), 1e4, np.maximum(upright_m * sigma_m / stated_m, LEAST_M))
+    down = np.where(np.isnan(faster[:, 2]), 1e3, sigma_mps)
+    level = np.where(has_velocity, sigma_mps, 1e3)
+    main = hypothesis(tip.state, 0)
+    main = dr.with_measured(
+        main,
+        np.concatenate([off, np.nan_to_num(faster)], axis=-1),
+        np.stack([sigma_m, sigma_m, upright, level, level, down], axis=-1),
+    )
+    return replace(
+        tip,
+        state=with_hypothesis(tip.state, 0, main),
+        heard=tip.cell,
+        scatter_m2=scatter_m2,
+        scatter_mps2=scatter_mps2,
+    )
+
+
+def _scatter(known: Floats, off: Floats, stated: Floats, least: float) -> tuple[Floats, Floats]:
+    """What a source scatters by (n,), squared, with one more vector (n, 3) of what it was off by; and the sigma to use."""
+    square = np.minimum(0.5 * (off[:, 0] ** 2 + off[:, 1] ** 2), 9.0 * known + 9.0 * least**2)
+    learnt = known + LEARNS * (square - known)
+    learnt = np.clip(learnt, least**2, np.maximum(stated, MOST_TIMES * least) ** 2)
+    return learnt, np.sqrt(LASTS * learnt)

@@ -1,0 +1,171 @@
+"""What vehicles tell of their own motion, in columns: what dead reckoning reads of the last seconds.
+
+Times are ns since 1970 UTC. What is told comes in any order and in any portions: a series is sorted by time and value, so that
+it is the same whatever came first.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.estimators.inertial import from_angles
+from gateway.observation import AirData, Attitude, ImuSample, Many, Observation
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+INERTIAL, ATTITUDE, AIRSPEED, ALTITUDE = range(4)
+WIDTHS = (7, 4, 1, 1)  # force, rate, sensor; quaternion; indicated airspeed; altitude above mean sea level
+PLACE = 9  # latitude, longitude, height; velocity north, east, down; sigmas level, upright, of the velocity
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Series:
+    """Values (n, k) and when each was so (n,), in order."""
+
+    at: Ints
+    values: Floats
+
+    @classmethod
+    def empty(cls, width: int) -> Series:
+        """Nothing yet."""
+        return cls(np.empty(0, np.int64), np.empty((0, width)))
+
+    def with_more(self, more: Series) -> Series:
+        """The same with what came since, each in its place."""
+        if not len(more.at):
+            return self
+        at, values = np.concatenate([self.at, more.at]), np.concatenate([self.values, more.values])
+        if (at[1:] > at[:-1]).all():
+            return Series(at, values)
+        order = np.lexsort((*values.T[::-1], at))
+        return Series(at[order], values[order])
+
+    def since(self, at: int) -> Series:
+        """What was so at an instant, or later."""
+        first = int(np.searchsorted(self.at, at))
+        return self if not first else Series(self.at[first:], self.values[first:])
+
+    def between(self, first: int, end: int) -> tuple[int, int]:
+        """The rows from an instant on up to another."""
+        begin, over = np.searchsorted(self.at, (first, end))
+        return int(begin), int(over)
+
+
+Portion = Mapping[str, Mapping[int, Series]]
+"""What some aircraft told: by aircraft, by kind."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Told:
+    """What one vehicle told lately, by kind; and its positions, those that the picture had of it included."""
+
+    series: tuple[Series, ...] = tuple(Series.empty(width) for width in WIDTHS)
+    places: Series = Series.empty(PLACE)
+    pictured: Series = Series.empty(PLACE)  # where the radar had it
+
+    def with_more(self, told: Mapping[int, Series]) -> Told:
+        """The same with what came since."""
+        series = tuple(one.with_more(told[kind]) if kind in told else one for kind, one in enumerate(self.series))
+        return replace(self, series=series)
+
+    def since(self, at: int) -> Told:
+        """The same without what was before an instant."""
+        series = tuple(one.since(at) for one in self.series)
+        return Told(series, self.places.since(at), self.pictured.since(at))
+
+    @property
+    def inertial(self) -> Series:
+        """Specific force and angular rate (n, 6) of the unit with the lowest number."""
+        whole = self.series[INERTIAL]
+        if not len(whole.at):
+            return whole
+        sensors = whole.values[:, 6]
+        lowest = sensors == sensors.min()
+        return whole if lowest.all() else Series(whole.at[lowest], whole.values[lowest])
+
+
+def reads(observation: Observation) -> bool:
+    """Whether dead reckoning reads this."""
+    if isinstance(observation, Many):
+        return observation.kind is ImuSample or "airspeed_mps" in observation.columns
+    if isinstance(observation, AirData):
+        return observation.airspeed_mps is not None or observation.altitude_msl_m is not None
+    return isinstance(observation, ImuSample | Attitude)
+
+
+def portioned(observations: Iterable[Observation], until: int) -> tuple[Portion, list[Observation]]:
+    """What observations received before a stamp tell; and those, or the parts of them, that came then or later."""
+    rows: defaultdict[tuple[str, int], list[tuple[int, tuple[float, ...]]]] = defaultdict(list)
+    parts: defaultdict[tuple[str, int], list[Series]] = defaultdict(list)
+    later: list[Observation] = []
+    for one in observations:
+        if isinstance(one, Many):
+            is_now = one.columns["received_at"] < until
+            if not is_now.all():
+                later.append(Many(one.kind, {name: column[~is_now] for name, column in one.columns.items()}))
+                one = Many(one.kind, {name: column[is_now] for name, column in one.columns.items()})
+            for key, series in _of_many(one):
+                parts[key].append(series)
+        elif isinstance(one, ImuSample | Attitude | AirData):
+            if one.received_at >= until:
+                later.append(one)
+                continue
+            for kind, values in _of_one(one):
+                rows[one.aircraft, kind].append((one.valid_at, values))
+    for (aircraft, kind), told in rows.items():
+        when = np.array([at for at, _ in told], np.int64)
+        parts[aircraft, kind].append(Series(when, np.array([values for _, values in told], np.float64)))
+    portion: defaultdict[str, dict[int, Series]] = defaultdict(dict)
+    for (aircraft, kind), several in parts.items():
+        whole = Series.empty(WIDTHS[kind])
+        at, joined = np.concatenate([one.at for one in several]), np.concatenate([one.values for one in several])
+        portion[aircraft][kind] = whole.with_more(Series(at, joined))
+    return portion, later
+
+
+def _of_one(one: ImuSample | Attitude | AirData) -> Sequence[tuple[int, tuple[float, ...]]]:
+    if isinstance(one, ImuSample):
+        if one.acceleration_mps2 is None or one.angular_rate_radps is None:
+            return ()
+        return ((INERTIAL, (*one.acceleration_mps2, *one.angular_rate_radps, float(one.sensor))),)
+    if isinstance(one, Attitude):
+        return ((ATTITUDE, tuple(from_angles(one.roll_rad, one.pitch_rad, one.yaw_rad).tolist())),)
+    told = ((AIRSPEED, one.airspeed_mps), (ALTITUDE, one.altitude_msl_m))
+    return tuple((kind, (value,)) for kind, value in told if value is not None)
+
+
+def _of_many(many: Many) -> Iterable[tuple[tuple[str, int], Series]]:
+    """What columns tell, aircraft by aircraft."""
+    columns = many.columns
+    wanted: list[tuple[int, Floats]] = []
+    if many.kind is ImuSample:
+        if "acceleration_mps2" in columns and "angular_rate_radps" in columns:
+            sensor = columns["sensor"].astype(np.float64)[:, None]
+            wanted.append((INERTIAL, np.hstack([columns["acceleration_mps2"], columns["angular_rate_radps"], sensor])))
+    else:
+        named = ((AIRSPEED, "airspeed_mps"), (ALTITUDE, "altitude_msl_m"))
+        wanted += [(kind, columns[name][:, None]) for kind, name in named if name in columns]
+    if not wanted or not len(many):
+        return
+    by_aircraft: defaultdict[str, list[int]] = defaultdict(list)
+    for row, name in enumerate(columns["aircraft"].tolist()):
+        by_aircraft[name].append(row)
+    for aircraft, members in by_aircraft.items():
+        rows = np.array(members)
+        for kind, values in wanted:
+            mine = values[rows]
+            known = ~np.isnan(mine).any(axis=1)
+            if known.any():
+                yield (aircraft, kind), Series(columns["valid_at"][rows][known], mine[known])
+
+
+def true_airspeed_mps(indicated_mps: Floats, height_m: Floats) -> Floats:
+    """What an indicated airspeed is at a height in the standard atmosphere."""
+    thinner = np.clip(1.0 - 2.255_77e-5 * height_m, 0.2, 1.2) ** 4.2559
+    return np.asarray(indicated_mps / np.sqrt(thinner))

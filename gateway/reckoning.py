@@ -1,0 +1,89 @@
+"""Dead reckoning, within a step: once a second as far as vehicles have told, and on into their tracks where positions fail."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gateway import fuse
+from gateway.align import SECOND, ReckonedFix
+from gateway.estimators.kalman import ERROR, POSITION
+from gateway.fuse import Lane
+from gateway.fusing import Fusing
+from gateway.picture import Event
+from gateway.reckon import JUMPED, NOTHING, Reckoned
+
+SERIAL = -2  # of what was not heard
+GPS_GONE_S = 3.0  # without a position for so long a radar shows dead reckoning where the vehicle is
+CORRELATED = 2.0  # a track's errors last for more than the second between two looks at it
+
+
+class Reckoning(Fusing):
+    """A step that knows where vehicles are that tell how they move."""
+
+    def _reckon(self, at: int) -> None:
+        """Everything that was told before an instant; and where positions are missing or denied, the tracks that go on by it."""
+        if self.options.dead_reckoning == "off" or not (self.reckoners.waiting or self.reckoners.by_aircraft):
+            return
+        self._settle()
+        before = self.reckoners
+        self.reckoners = before.advanced(at, self.history, self.site.dead_reckoning)
+        if self.reckoners.crowded:
+            self.once("more vehicles tell how they move than are followed by dead reckoning: the others are not")
+        for aircraft in self.reckoners.by_aircraft:
+            found = self.reckoners.of(aircraft, at)
+            self._tell_denied(aircraft, before.denied(aircraft), self.reckoners.denied(aircraft), at)
+            lane = self.lanes.lanes.get(self.lanes.by_aircraft.get(aircraft, 0))
+            if found is None or lane is None or not lane.events or lane.ended_at is not None:
+                continue
+            self.reckoned.append(found)
+            newly = found.denied != NOTHING and before.denied(aircraft) == NOTHING
+            if lane.coasting_at(at, self.options) or newly:
+                self._go_on(lane, found, is_forced=newly)
+            elif at - found.heard_at > GPS_GONE_S * SECOND and at - lane.last.radar_at <= SECOND * 2:
+                self._show(lane, aircraft)
+        self._settle()
+
+    def _go_on(self, lane: Lane, found: Reckoned, *, is_forced: bool) -> None:
+        """The track goes on from where dead reckoning has it, and with how sure that is."""
+        axes = self.frame.local_from_enu(found.latitude_rad, found.longitude_rad)
+        north, east, down = found.velocity_mps
+        sigma = found.sigma_m[[1, 0, 2]]
+        fix = ReckonedFix(
+            found.at,
+            SERIAL,
+            -1,
+            found.aircraft,
+            self._enu_of(found),
+            sigma,
+            axes.T @ np.array([east, north, -down]),
+            float(np.max(found.velocity_sigma_mps)),
+            False,
+            is_forced=is_forced,
+        )
+        self._work_in(*fuse.take_fix(self.lanes, fix, self._scene()))
+
+    def _show(self, lane: Lane, aircraft: str) -> None:
+        """Where radars have the vehicle corrects dead reckoning, in the position source's own coordinates."""
+        event = lane.last
+        place, error = event.mean[POSITION], event.mean[ERROR]
+        both = np.hstack([np.eye(3), np.eye(3)])
+        some = np.r_[POSITION, ERROR]
+        variance = np.diagonal(both @ event.covariance[np.ix_(some, some)] @ both.T)
+        latitude, longitude, height = self.frame.geodetic_from_enu(place + error)
+        level = CORRELATED * math.sqrt(0.5 * float(variance[0] + variance[1]))
+        upright = CORRELATED * math.sqrt(float(variance[2]))
+        told = (float(latitude), float(longitude), float(height), math.nan, math.nan, math.nan, level, upright, 1e3)
+        self.reckoners = self.reckoners.pictured(aircraft, event.at, told)
+
+    def _tell_denied(self, aircraft: str, before: int, now: int, at: int) -> None:
+        if before == now:
+            return
+        if now == NOTHING:
+            self.events.append(Event(at, "info", f"{aircraft}: what it says of its position agrees again, and is used"))
+            return
+        how = "jumped" if now == JUMPED else "walks off slowly"
+        text = f"{aircraft}: what it says of its position {how}, which inertial data deny: it is not used"
+        self.count("position sources denied")
+        self.events.append(Event(at, "warning", text))
