@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from adapters import Arrival, Source, told
+from adapters import Arrival, Source, declared, told
 from adapters.arrivals import Arrivals
 from adapters.epoch import SessionEpoch
 from adapters.frame_batches import MANY, NO_HEAD, Head, frame_of, payload_of, wanted
@@ -37,7 +37,7 @@ from adapters.signing import advice
 from adapters.together import Together
 from adapters.vehicles import Component
 from adapters.wellbeing import vehicles_health
-from gateway.observation import Heard, Observation
+from gateway.observation import Heard, Observation, WeatherArea
 from gateway.picture import Health
 
 Observations = tuple[Observation, ...]
@@ -241,12 +241,16 @@ class Decoder:
         return self._with_plans(found, arrival.received_at)
 
     def _hear_told(self, arrival: Arrival, listened: Listened) -> Observations:
-        plan = told.decode(arrival.data)
-        if plan is None:
+        now, plan = self._epoch.session_time(arrival.received_at), told.decode(arrival.data)
+        if plan is not None:
+            listened.counters["plans"] += 1
+            return self._plans.hear(plan, now, arrival.received_at)
+        said = declared.decode(arrival.data, now, arrival.received_at)
+        if said is None:
             listened.counters["not understood"] += 1
             return ()
-        listened.counters["plans"] += 1
-        return self._plans.hear(plan, self._epoch.session_time(arrival.received_at), arrival.received_at)
+        listened.counters["weather" if isinstance(said, WeatherArea) else "declarations"] += 1
+        return (said,)
 
     def _with_plans(self, found: Observations, received_at: int) -> Observations:
         """What was heard, and what was told that becomes of it."""

@@ -14,6 +14,8 @@ from typing import Any, TypeVar, cast
 
 from numpy.typing import NDArray
 
+from gateway.settings import Weather
+
 _Made = TypeVar("_Made")
 
 
@@ -214,17 +216,32 @@ class PlanPoint:
 @made_swiftly
 @dataclass(frozen=True, slots=True)
 class Intent:
-    """Where a vehicle says that it goes next: a point, or the item of its plan with this sequence number, or both."""
+    """Where a vehicle goes next, as it says or a person does: a point, an item of its plan with this number, or a known name.
+
+    With none of them what the same teller said before is withdrawn.
+    """
 
     aircraft: str
     valid_at: int
     received_at: int
-    told_by: str  # "utm", "mission", "high latency"
+    told_by: str  # "declared" (by a person), "utm", "mission", "high latency"
     sequence: int | None = None
     latitude_rad: float | None = None
     longitude_rad: float | None = None
     altitude_msl_m: float | None = None
     height_m: float | None = None
+    name: str | None = None  # of a published point, or "runway", "go-around", "home"
+
+
+@made_swiftly
+@dataclass(frozen=True, slots=True)
+class WeatherArea:
+    """An area to avoid, as a person told it while the session ran; None: the one of this name is gone."""
+
+    name: str
+    valid_at: int
+    received_at: int
+    area: Weather | None
 
 
 @made_swiftly
@@ -272,7 +289,7 @@ def _told(value: Any) -> Any:
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
-_Said = VehicleStatus | FlightPlan | Intent | Truth
+_Said = VehicleStatus | FlightPlan | Intent | WeatherArea | Truth
 Observation = GpsReport | RadarPlot | RadarStatus | Attitude | ImuSample | AirData | Many | _Said
 
 

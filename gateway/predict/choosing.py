@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gateway.estimators.circling import ON_CIRCLE, Circles
 from gateway.estimators.intent import BELIEVED, USED_IN_TURN_RAD, Belief, Seen, to_turn
 from gateway.geodesy import wrap_rad
-from gateway.predict.goals import COUNT, GO_AROUND, RUNWAY, Goals
+from gateway.predict.goals import GO_AROUND, RUNWAY, Goals
 from gateway.predict.minds import Minds
 from gateway.predict.table import DECLARED, INFERRED, NONE
 from gateway.predict.thinking import Motions, inferred, trusted
@@ -148,9 +148,9 @@ def _inferred(
 ) -> tuple[Seen, Belief, Floats]:
     """`thinking.inferred`, in which only who is on final lands or goes around."""
     final = _on_final(now, site)
-    lowered = np.ones((len(goals), COUNT))
-    lowered[:, RUNWAY] = final
-    lowered[:, GO_AROUND] = final * _goes_around(now, climb, site)
+    lowered = np.stack([one.lowered for one in goals])
+    lowered[:, RUNWAY] *= final
+    lowered[:, GO_AROUND] *= final * _goes_around(now, climb, site)
     return inferred(before, at, now, routes[:, :, 0], np.stack([one.planned for one in goals]), lowered)
 
 

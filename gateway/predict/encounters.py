@@ -62,7 +62,7 @@ def encounters(ways: Ways, at: int, separation: Separation) -> Encounters:
     """The pairs that come nearer than 1.25 separations within the time that is looked ahead from an instant."""
     times_s = np.arange(0.0, separation.look_ahead_s + 1e-9, STEP_S)
     place = _level(at_instant(ways, at, times_s), ways.has_height, separation.least_height_m)
-    velocity = np.nan_to_num(np.gradient(place, STEP_S, axis=1))
+    velocity = _velocity(place)
     fastest = math.sqrt((velocity[..., 0] ** 2 + velocity[..., 1] ** 2).max(initial=0.0))
     reach_m = WIDER * separation.horizontal_m + STEP_S * min(fastest, FASTEST_MPS)
     hits = neighbours(place[..., :2], reach_m)
@@ -75,6 +75,15 @@ def _level(place: Floats, has_height: Bools, least_height_m: float) -> Floats:
     up = place[..., 2] + (place[..., 0] ** 2 + place[..., 1] ** 2) / (2.0 * EARTH_M)
     flies = (up >= least_height_m) | ~has_height[:, None]
     return np.where(flies[..., None], np.stack([place[..., 0], place[..., 1], up], axis=-1), np.nan)
+
+
+def _velocity(place: Floats) -> Floats:
+    """Of places (n, g, 3) on the grid: to the next, from the last before, or between both; 0 where neither is known."""
+    step = np.diff(place, axis=1) / STEP_S
+    none = np.full((len(place), 1, 3), math.nan)
+    onward, before = np.concatenate([step, none], axis=1), np.concatenate([none, step], axis=1)
+    both = 0.5 * (onward + before)
+    return np.nan_to_num(np.where(np.isnan(both), np.where(np.isnan(onward), before, onward), both))
 
 
 def neighbours(place: Floats, reach_m: float) -> tuple[Ints, Ints, Ints]:

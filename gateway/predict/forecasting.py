@@ -14,6 +14,7 @@ from gateway.estimators.modes import level_turn_rate
 from gateway.frames import RunwayFrame
 from gateway.fuse import Lane
 from gateway.fuse.weighting import Model
+from gateway.predict import weather
 from gateway.predict.choosing import Chosen, chosen
 from gateway.predict.heights import heights
 from gateway.predict.predicting import Predicting
@@ -58,6 +59,7 @@ def forecast(
     tracks = tuple(lane.track for lane in lanes)
     before = predicting.remembered.of(tracks)
     state = State.of(lanes, at, model)
+    goals = weather.around(goals, state, weather.areas(predicting.tellings, site, frame, at, separation_m))
     usual = level_turn_rate(state.speed, site.estimation.bank_rad, site.estimation.turn_rate_rps)
     winds = _winds(predicting, lanes, at)
     through_air = np.sqrt(((state.velocity - winds) ** 2).sum(axis=1))
@@ -86,7 +88,8 @@ def forecast(
     up = heights(state.up, state.climb, now, ahead, way.up, way.lands, way.route, horizons)
     mean = np.concatenate([ahead.position, up[..., None]], axis=2)
     known_s, reported = around - state.since_s[:, None], np.array([lane.aircraft is not None for lane in lanes])
-    ways = ways_of([lane.number for lane in lanes], at, state, whole, known_s, up, sigma, horizons_s, reported)
+    tracks_told = [lane.number for lane in lanes]
+    ways = ways_of(tracks_told, at, state, whole, known_s, up, sigma, horizons_s, by_points, reported, frame)
     told_names = [one.names[best] if best >= 0 else None for one, best in zip(goals, way.best.tolist(), strict=True)]
     made = Forecast(
         at,

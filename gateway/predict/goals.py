@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +19,14 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 COUNT = (
-    18  # places for candidates: always as many, so that sums over them have the same bits for one aircraft and for many
+    20  # places for candidates: always as many, so that sums over them have the same bits for one aircraft and for many
 )
 LEGS = 4  # points of a route: the candidate and what the plan has after it
 PLANNED = range(0, 10)
 DECLARED, HOME = 10, 11
 PUBLISHED = range(12, 16)
 RUNWAY, GO_AROUND = 16, 17
+AROUND = (18, 19)  # an area of weather, to its left and to its right: `weather`
 SAME_PLACE_RAD = 1e-6
 GO_AROUND_M = 5000.0  # beyond the runway's far end
 
@@ -48,6 +49,7 @@ class Goals:
     least: Floats  # (c, 4) radians that are flown round it at least
     declared: int = -1  # which one it is said to go to
     declared_at: int = 0
+    lowered: Floats = field(default_factory=lambda: np.ones(COUNT))  # (c,) of the weight, where weather is in the way
 
 
 def goals_of(told: Told | None, site: Site, frame: RunwayFrame, separation_m: float) -> Goals:
@@ -90,10 +92,13 @@ def goals_of(told: Told | None, site: Site, frame: RunwayFrame, separation_m: fl
     if told.plan is not None and told.plan.points and told.plan.points[0].kind == "home":
         enu = _place(told.plan.points[0], home_m, separation_m, site, frame)
         route[HOME, 0], names[HOME] = enu[:2], "home"
-    chosen = _declared(declared, points)
-    if chosen == DECLARED and declared is not None and declared.latitude_rad is not None:
-        route[DECLARED, 0], up[DECLARED, 0] = _declared_place(declared, separation_m, site, frame)
-        names[DECLARED] = "next waypoint" if declared.sequence is None else f"item {declared.sequence}"
+    chosen = _declared(declared, points, names)
+    if chosen == DECLARED and declared is not None:
+        place = _declared_place(declared, separation_m, site, frame)
+        if place is None:
+            chosen = -1
+        else:
+            (route[DECLARED, 0], up[DECLARED, 0]), names[DECLARED] = place, _called(declared)
     since = declared.valid_at if declared is not None else 0
     return Goals(route, up, tuple(names), planned, lands, circles, rounds, radius, least, chosen, since)
 
@@ -131,12 +136,19 @@ def _enu(latitude: float, longitude: float, height_m: float | None, site: Site, 
     return there if height_m is not None else np.array([there[0], there[1], math.nan])
 
 
-def _declared(declared: Intent | None, points: Sequence[PlanPoint]) -> int:
-    """Which candidate a declared intent is: the plan's first point, since the plan begins there, or the declared place."""
+def _declared(declared: Intent | None, points: Sequence[PlanPoint], names: Sequence[str | None]) -> int:
+    """Which candidate a declared intent is: one of that name, the plan's first point, since the plan begins there, or a place
+    of its own.
+    """
     if declared is None:
         return -1
+    if declared.name is not None:
+        wanted = declared.name.casefold()
+        return next((slot for slot, name in enumerate(names) if name and name.casefold() == wanted), DECLARED)
     if declared.latitude_rad is None or declared.longitude_rad is None:
-        return PLANNED[0] if points else -1
+        return (
+            PLANNED[0] if (points and points[0].sequence == declared.sequence) or _by_vehicle(declared, points) else -1
+        )
     if declared.sequence is not None and points:
         off_rad = abs(declared.latitude_rad - points[0].latitude_rad) + abs(
             declared.longitude_rad - points[0].longitude_rad
@@ -146,11 +158,33 @@ def _declared(declared: Intent | None, points: Sequence[PlanPoint]) -> int:
     return DECLARED
 
 
-def _declared_place(declared: Intent, separation_m: float, site: Site, frame: RunwayFrame) -> tuple[Floats, float]:
-    height = declared.height_m
+def _by_vehicle(declared: Intent, points: Sequence[PlanPoint]) -> bool:
+    """Whether a vehicle says the item, which may be a command before the plan's next point."""
+    return bool(points) and declared.told_by != "declared"
+
+
+def _called(declared: Intent) -> str:
+    if declared.name is not None:
+        return declared.name
+    if declared.sequence is not None:
+        return f"item {declared.sequence}"
+    return "declared point" if declared.told_by == "declared" else "next waypoint"
+
+
+def _declared_place(
+    declared: Intent, separation_m: float, site: Site, frame: RunwayFrame
+) -> tuple[Floats, float] | None:
+    """East and north (2,), and up, of a place that is declared; None of a name that no published point has."""
+    latitude, longitude, height = declared.latitude_rad, declared.longitude_rad, declared.height_m
+    if declared.name is not None:
+        wanted = declared.name.casefold()
+        point = next((one for one in site.waypoints if one.name.casefold() == wanted), None)
+        latitude, longitude = (None, None) if point is None else (point.latitude_rad, point.longitude_rad)
+    if latitude is None or longitude is None:
+        return None
     if height is None and declared.altitude_msl_m is not None:
         height = declared.altitude_msl_m + separation_m
-    there = _enu(declared.latitude_rad or 0.0, declared.longitude_rad or 0.0, height, site, frame)
+    there = _enu(latitude, longitude, height, site, frame)
     return there[:2], float(there[2])
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from gateway.align import SECOND
 from gateway.frames import RunwayFrame
 from gateway.fuse import Lane
+from gateway.observation import WeatherArea
 from gateway.predict.goals import Goals, goals_of
 from gateway.predict.minds import Remembered
 from gateway.predict.told import Said, Tellings
@@ -46,10 +47,12 @@ class Predicting:
         return replace(self, planned=self.planned[1:]), self.planned[0][1]
 
     def hearing(self, said: Said) -> Predicting:
-        """The same with one thing more that an aircraft said."""
+        """The same with one thing more that was said."""
         tellings = self.tellings.hearing(said)
         if tellings is self.tellings:
             return self
+        if isinstance(said, WeatherArea):
+            return replace(self, tellings=tellings)
         known = self.tellings.by_aircraft.get(said.aircraft)
         now = tellings.by_aircraft[said.aircraft]
         if known is not None and known.plan is now.plan and known.intents is now.intents:

@@ -1,4 +1,4 @@
-"""What aircraft say, or are said, to be about to do: plans, where they go next, and the wind that they fly in."""
+"""What aircraft say, or are said, to be about to do: plans, where they go next, the wind that they fly in; and the weather."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from gateway.align import SECOND
-from gateway.observation import AirData, FlightPlan, Intent
+from gateway.observation import AirData, FlightPlan, Intent, WeatherArea
+from gateway.settings import Site
 
 AIRCRAFT_AT_MOST = 10_000  # a bound on what strangers can make us remember
-TELLERS = ("utm", "mission", "high latency")  # whoever stands first is believed first
+AREAS_AT_MOST = 200
+TELLERS = ("declared", "utm", "mission", "high latency")  # whoever stands first is believed first
+FIXED_NAMES = ("runway", "go-around")  # of points that every site has
 FORGOTTEN_AFTER = 3600 * SECOND  # of aircraft that are not tracked
 
-Said = FlightPlan | Intent | AirData
+Said = FlightPlan | Intent | AirData | WeatherArea
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,24 +38,43 @@ class Told:
 
 def has_goal(intent: Intent) -> bool:
     """Whether it says where to."""
-    return intent.sequence is not None or intent.latitude_rad is not None
+    return intent.sequence is not None or intent.latitude_rad is not None or intent.name is not None
+
+
+def known_points(told: Told | None, site: Site) -> tuple[str, ...]:
+    """The names of the points that one aircraft can be declared to go to, the plan's items by their numbers."""
+    points = told.plan.points if told is not None and told.plan is not None else ()
+    home = ("home",) if any(point.kind == "home" for point in points) else ()
+    items = tuple(str(point.sequence) for point in points if point.kind != "home")
+    return (*(waypoint.name for waypoint in site.waypoints), *FIXED_NAMES, *home, *items)
 
 
 @dataclass(frozen=True, slots=True)
 class Tellings:
-    """What all aircraft have said."""
+    """What all aircraft have said, and the areas of weather that people told, by name."""
 
     by_aircraft: Mapping[str, Told] = field(default_factory=dict)
+    weather: Mapping[str, WeatherArea] = field(default_factory=dict)
 
     def hearing(self, said: Said) -> Tellings:
         """The same with one thing more; what is older than what is known of its kind changes nothing."""
+        if isinstance(said, WeatherArea):
+            return self._hearing_weather(said)
         known = self.by_aircraft.get(said.aircraft)
         if known is None:
             if len(self.by_aircraft) >= AIRCRAFT_AT_MOST:
                 return self
             known = Told()
         after = _after(known, said)
-        return self if after is known else Tellings({**self.by_aircraft, said.aircraft: after})
+        return self if after is known else Tellings({**self.by_aircraft, said.aircraft: after}, self.weather)
+
+    def _hearing_weather(self, said: WeatherArea) -> Tellings:
+        known = self.weather.get(said.name)
+        if (known is not None and said.valid_at < known.valid_at) or (known is None and said.area is None):
+            return self
+        if known is None and len(self.weather) >= AREAS_AT_MOST:
+            return self
+        return Tellings(self.by_aircraft, {**self.weather, said.name: said})
 
     def remembered(self, tracked: Mapping[str, int], at: int) -> Tellings:
         """The same without aircraft that are not tracked and have said nothing for an hour."""
@@ -61,10 +83,10 @@ class Tellings:
         ]
         if not gone:
             return self
-        return Tellings({name: told for name, told in self.by_aircraft.items() if name not in gone})
+        return Tellings({name: told for name, told in self.by_aircraft.items() if name not in gone}, self.weather)
 
 
-def _after(known: Told, said: Said) -> Told:
+def _after(known: Told, said: FlightPlan | Intent | AirData) -> Told:
     at = max(known.at, said.valid_at)
     if isinstance(said, FlightPlan):
         if known.plan is not None and said.valid_at < known.plan.valid_at:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND
 from gateway.estimators.two_segment import Ahead
+from gateway.frames import RunwayFrame, turn
 from gateway.predict.spread import Spread
 from gateway.predict.states import State
 
@@ -18,6 +20,10 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 STEP_S = 5.0  # of the grid
+FREE_TURN_RAD = math.radians(60.0)  # a turn of which nobody knows where it ends is followed no further
+FINAL_M = (2_000.0, 40_000.0)  # before the aiming point a final is joined
+ABOVE_GLIDE_PATH_M = 150.0  # from no higher than this
+CROSSES = math.tan(math.radians(20.0))  # at more than this angle it is crossed, and not flown along
 MOST_TURNED_RAD = 5.0  # between two points of a path; who turns further is drawn through the middle of its circle
 LEVELS_OFF, CLIMBS_MPS = 0.2, 0.3  # a climb may change by this share of it, and who is level may begin to climb
 
@@ -28,7 +34,7 @@ class Ways:
 
     track: Ints  # (n,)
     made: Ints  # (n,) ns
-    place: Floats  # (n, g, 3) ENU
+    place: Floats  # (n, g, 3) ENU; NaN from where on nobody can know
     course: Floats  # (n, g) from east to north
     along: Floats  # (n, g) sigmas of the place, along and across the course, and upright
     across: Floats
@@ -61,12 +67,14 @@ def ways_of(
     up: Floats,
     spread: Spread,
     horizons_s: Sequence[float],
+    by_points: Bools,
     reported: Bools,
+    frame: RunwayFrame,
 ) -> Ways:
     """The ways of n tracks that were foretold at an instant.
 
     `whole` are their paths at times `known_s` (n, k) after it, one of them not later than it; `up` (n, h) and `spread` what is
-    foretold at the horizons.
+    foretold at the horizons; `by_points` (n,) who flies to a point and not on as now, `reported` (n,) who says where it is.
     """
     times = grid_s(horizons_s)
     level, course = path_on(times, known_s, whole.position, whole.course)
@@ -80,8 +88,22 @@ def ways_of(
     wanders = state.climb_sigma**2 + (LEVELS_OFF * state.climb) ** 2 + CLIMBS_MPS**2
     upright = np.sqrt(state.up_sigma[:, None] ** 2 + wanders[:, None] * times * times)
     place = np.concatenate([level, height[..., None]], axis=2)
+    beyond = (np.abs(course - course[:, :1]) > FREE_TURN_RAD) & ~by_points[:, None]
+    place[beyond | _joins_final(place, frame) & ~by_points[:, None]] = np.nan
     at = np.full(len(tracks), made, dtype=np.int64)
     return Ways(np.array(tracks, dtype=np.int64), at, place, course, along, across, upright, state.has_height, reported)
+
+
+def _joins_final(place: Floats, frame: RunwayFrame) -> Bools:
+    """From where on (n, g) aircraft have crossed the final at a height from which they may join it: who does so turns there."""
+    runway = frame.runway
+    x, y, up = np.moveaxis(turn(frame.runway_from_enu, place), -1, 0)
+    before_m = runway.aiming_point_x_m - x
+    crosses = (y[:, 1:] * y[:, :-1] <= 0.0) & (np.abs(np.diff(y, axis=1)) > np.abs(np.diff(x, axis=1)) * CROSSES)
+    low = up < before_m * math.tan(runway.glide_path_rad) + ABOVE_GLIDE_PATH_M
+    joins = crosses & low[:, 1:] & (before_m[:, 1:] > FINAL_M[0]) & (before_m[:, 1:] < FINAL_M[1])
+    after = np.maximum.accumulate(joins, axis=1)
+    return np.concatenate([np.zeros((len(place), 1), dtype=np.bool_), after], axis=1)
 
 
 def grid_s(horizons_s: Sequence[float]) -> Floats:

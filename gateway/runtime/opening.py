@@ -1,10 +1,10 @@
-"""What was said before a session's beginning (replay --from) and still holds then: plans, states, where radars stand."""
+"""What was said before a session's beginning (replay --from) and still holds then: plans, what people declared, states, where radars stand."""
 
 from __future__ import annotations
 
 from collections import deque
 
-from gateway.observation import FlightPlan, Heard, Observation, RadarStatus, VehicleStatus
+from gateway.observation import FlightPlan, Heard, Intent, Observation, RadarStatus, VehicleStatus, WeatherArea
 
 _NOTES_AT_MOST = 32
 
@@ -22,6 +22,10 @@ class Opening:
         for observation in heard.observations:
             if isinstance(observation, FlightPlan | VehicleStatus):
                 self._holding[type(observation), observation.aircraft] = observation
+            elif isinstance(observation, Intent) and observation.told_by == "declared":
+                self._holding[type(observation), observation.aircraft] = observation
+            elif isinstance(observation, WeatherArea):
+                self._holding[type(observation), observation.name] = observation
             elif isinstance(observation, RadarStatus):
                 self._holding[type(observation), observation.radar] = observation
         self._notes += heard.notes

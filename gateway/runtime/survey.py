@@ -16,7 +16,16 @@ from adapters.decode import Decoder
 from adapters.mavlink_frames import Frame, fields, message_name, parse
 from adapters.roles import by_heartbeat, by_number
 from adapters.sequences import SequenceCheck, Siblings
-from gateway.observation import FlightPlan, GpsReport, Many, Observation, RadarPlot, RadarStatus, Timing
+from gateway.observation import (
+    FlightPlan,
+    GpsReport,
+    Many,
+    Observation,
+    RadarPlot,
+    RadarStatus,
+    Timing,
+    WeatherArea,
+)
 from gateway.picture import Health, VehicleHealth
 from gateway.runtime.places import PlaceFinder
 from gateway.runtime.playback import Playback
@@ -202,6 +211,8 @@ def _see(found: Survey, observation: Observation) -> None:
     found.observations[kind] += 1
     if isinstance(observation, RadarPlot | RadarStatus):
         _see_radar(found, observation)
+        return
+    if isinstance(observation, WeatherArea):
         return
     seen = found.aircraft.get(observation.aircraft)
     if seen is None:
