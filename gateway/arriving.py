@@ -8,13 +8,23 @@ from gateway import align
 from gateway.align import Fix, Geoid, Plot
 from gateway.believing import Believing
 from gateway.making import NAMED_AT_MOST
-from gateway.observation import AirData, FlightPlan, GpsReport, Heard, Intent, RadarPlot, RadarStatus, Timing
+from gateway.observation import (
+    AirData,
+    FlightPlan,
+    GpsReport,
+    Heard,
+    Intent,
+    RadarPlot,
+    RadarStatus,
+    Timing,
+    WeatherArea,
+)
 from gateway.state import State
 
 CONTRADICTION_M = 5.0  # between the site's and the streams' geoid: beyond this it is said
 AIRCRAFT_AT_MOST, RADARS_AT_MOST = 10_000, 64  # a bound on what strangers can make us remember
 STAGED = (GpsReport, RadarPlot, RadarStatus)
-FORETELLING = (FlightPlan, Intent, AirData)  # they tell predict where an aircraft is going, and the wind
+FORETELLING = (FlightPlan, Intent, AirData, WeatherArea)  # where an aircraft is going, the wind and the weather
 
 
 class Arriving(Believing):
