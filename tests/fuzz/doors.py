@@ -14,7 +14,7 @@ import corpus
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters import Arrival
+from adapters import Arrival, Source
 from adapters.arrivals import Arrivals
 from adapters.columns import iter_columns
 from adapters.decode import Decoder
@@ -109,8 +109,14 @@ class Live:
         self.manners = Manners(heartbeat=True, request_rates=True, fetch_mission=True, key=key)
         self.state = pipeline.initial(corpus.SITE) if self.pictured else None
 
-    def take(self, now: int, link: int, peer: str, data: Sequence[bytes], lines: Sequence[bytes] = ()) -> Arrivals:
-        """What a peer sends at once; what people tell. As arrivals, decoded, answered and worked in."""
+    def take(self, now: int, link: int, peer: str, data: Sequence[bytes], lines: Sequence[bytes] = ()) -> None:
+        """What a peer sends at once; what people tell. Taken in, answered, decoded and worked in."""
+        self.hear(now, *self.receive(now, link, peer, data, lines))
+
+    def receive(
+        self, now: int, link: int, peer: str, data: Sequence[bytes], lines: Sequence[bytes] = ()
+    ) -> tuple[Sequence[Source], Arrivals]:
+        """What a peer sends at once, and what people tell, as arrivals, answered; the sources that are new with them."""
         self.now = now
         stream = 0 if link == STREAM else None
         chunks = Chunks.of([peer] * len(data), list(data), [0] * len(data), stream)
@@ -119,12 +125,18 @@ class Live:
             more, told = self.intake.tell(lines)
             sources, arrivals = sources + more, Arrivals.joined([arrivals, told])
         for source in sources:
-            self.decoder.add(source)
             self.manners.add(source)
-        heard = self._decode(arrivals)
         self.manners.hear(arrivals)
         self.manners.due(self.now)
         self.manners.notes.clear()
+        return sources, arrivals
+
+    def hear(self, now: int, sources: Sequence[Source], arrivals: Arrivals) -> None:
+        """Arrivals, these or those that another session has received: decoded and worked in."""
+        self.now = now
+        for source in sources:
+            self.decoder.add(source)
+        heard = self._decode(arrivals)
         self.heard += len(arrivals)
         for one in heard:
             for observation in one.observations:
@@ -132,7 +144,6 @@ class Live:
                 check_observation(observation)
         if self.state is not None:
             self._work(heard)
-        return arrivals
 
     def _decode(self, arrivals: Sequence[Arrival]) -> list[Heard]:
         """Many at once as a run does it, or with `one_by_one` each by itself."""

@@ -18,6 +18,7 @@ import tempfile
 import time
 import traceback
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -46,13 +47,20 @@ def rss_mb() -> float:
 
 
 class Episode:
-    """A session that is heard for a while, twice: many datagrams together, and each by itself."""
+    """A session that is received for a while, and heard twice: many datagrams together, and each by itself."""
 
     def __init__(self, now: int = corpus.BEGIN, *, signed: bool = False, pictured: bool = False) -> None:
         self.twins = (
             Live(signed=signed, pictured=pictured, now=now),
             Live(signed=signed, one_by_one=True, now=now),
         )
+
+    def take(self, now: int, link: int, peer: str, data: Sequence[bytes], lines: Sequence[bytes]) -> None:
+        """What a peer sends at once; what people tell."""
+        together, single = self.twins
+        sources, arrivals = together.receive(now, link, peer, data, lines)
+        together.hear(now, sources, arrivals)
+        single.hear(now, sources, arrivals)
 
     def ended(self) -> Counter[str]:
         """What was observed. Raises Unsound where the two differ."""
@@ -94,7 +102,7 @@ class Fuzzer:
             link, peer, batch, lines = self._batch()
             try:
                 signal.alarm(HANG_S)
-                for one in (*session.twins, self.source.choice(self.endless)):
+                for one in (session, self.source.choice(self.endless)):
                     one.take(self.telemetry.now, link, peer, batch, lines)
             except Exception:
                 print(f"link {link}, peer {peer!r}, batch: {[data.hex() for data in batch]}, told: {lines}")
