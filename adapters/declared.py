@@ -75,6 +75,23 @@ def decode(data: bytes, now: int, received_at: int) -> Intent | WeatherArea | No
     return _weather(told, now, received_at) if told.get("told") == "weather" else None
 
 
+def sentence(said: Intent | WeatherArea) -> str:
+    """What was declared, for people."""
+    if isinstance(said, WeatherArea):
+        return f"weather {said.name} is {'gone' if said.area is None else 'told'}"
+    if not says_where(said):
+        return f"what was declared of {said.aircraft} is withdrawn"
+    place = (said.latitude_rad or 0.0, said.longitude_rad or 0.0)
+    there = ", ".join(f"{math.degrees(angle):.4f}" for angle in place)
+    where = said.name or (there if said.sequence is None else f"item {said.sequence} of its plan")
+    return f"{said.aircraft} is declared to go to {where}"
+
+
+def says_where(said: Intent) -> bool:
+    """Whether it does not withdraw what was said before."""
+    return said.name is not None or said.sequence is not None or said.latitude_rad is not None
+
+
 def _intent(told: Mapping[str, Any], now: int, received_at: int) -> Intent | None:
     aircraft, name, item = told.get("aircraft"), told.get("to"), told.get("item")
     place = _place(told)

@@ -250,6 +250,7 @@ class Decoder:
             listened.counters["not understood"] += 1
             return ()
         listened.counters["weather" if isinstance(said, WeatherArea) else "declarations"] += 1
+        self._notes.append(("info", declared.sentence(said)))
         return (said,)
 
     def _with_plans(self, found: Observations, received_at: int) -> Observations:

@@ -12,6 +12,7 @@ from gateway import __version__
 from gateway.cli import (
     check,
     columns,
+    declare,
     demo,
     flows,
     live,
@@ -41,6 +42,7 @@ _COMMANDS = (
     live,
     replay,
     simulate,
+    declare,
     play,
     check,
     columns,

@@ -18,6 +18,7 @@ from gateway.cli.spread import spread
 
 if TYPE_CHECKING:
     from gateway.runtime.allowed import Allowed
+    from gateway.runtime.declaring import Declaring
     from gateway.runtime.links import Link
     from gateway.runtime.manners import Manners
     from gateway.runtime.setup import Setup
@@ -55,6 +56,43 @@ PlanOption = Annotated[
         show_default=False,
     ),
 ]
+
+
+@dataclass(frozen=True, slots=True)
+class Declares:
+    """How people may declare where aircraft go, and weather."""
+
+    declared: Annotated[
+        Path | None,
+        typer.Option(
+            "--declared",
+            metavar="FILE",
+            help="A TOML file that is watched: [[declared]] where aircraft go, [[weather]] to avoid.",
+            show_default=False,
+        ),
+    ] = None
+    declare_port: Annotated[
+        int | None,
+        typer.Option(
+            "--declare-port",
+            metavar="N",
+            min=0,
+            max=65535,
+            help="Where `talkdown declare` is listened to, on this machine only; 0 takes a free port. (default: 30071)",
+            show_default=False,
+        ),
+    ] = None
+
+    def opened(self) -> Declaring:
+        """Both, open. Raises LinkError, UsageError."""
+        from gateway.runtime.declaring import Declaring, DeclaringPort, WatchedFile
+        from gateway.settings import SiteError
+
+        try:
+            file = None if self.declared is None else WatchedFile(self.declared)
+        except SiteError as error:
+            raise UsageError(str(error)) from error
+        return Declaring(DeclaringPort(self.declare_port), file)
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,6 +249,7 @@ def live(
     seen: take.Seen = take.Seen(),
     seconds: SecondsOption = None,
     plan: PlanOption = None,
+    declares: Declares = Declares(),
     methods: take.Methods = take.Methods(),
     key: take.KeyOption = None,
     trust: Trust = Trust(),
@@ -244,6 +283,9 @@ def live(
         ):
             for link in (*opened[0], *opened[1]):
                 display.say(f"Listening on {link.url}.{buffer_of(link)}")
+            declaring = declares.opened()
+            if declaring.port is not None:
+                display.say(f"Declarations on port {declaring.port.port} of this machine.")
             summary = run_live(
                 *opened,
                 setup,
@@ -253,6 +295,7 @@ def live(
                 allowed=allowed,
                 manners=sending.manners(signing_key),
                 told=told,
+                declaring=declaring,
             )
         display.show(summary)
     except (LinkError, FolderError, AllowError, FileError) as error:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from adapters import Arrival
 from gateway.picture import Picture
 from gateway.runtime.allowed import Allowed
+from gateway.runtime.declaring import Declaring
 from gateway.runtime.interpreter import UnhurriedCollection
 from gateway.runtime.links import Link
 from gateway.runtime.manners import Manners
@@ -51,11 +52,12 @@ def run_live(
     allowed: Allowed | None = None,
     manners: Manners | None = None,
     told: Sequence[bytes] = (),
+    declaring: Declaring = Declaring(),
 ) -> Summary:
     """Fuse what open links bring until asked to stop, or for so many seconds; closes the links.
 
     `allowed`: who may be heard; None: everybody. `manners`: what may be sent on the MAVLink links; None: nothing. `told`:
-    what the gateway is told at the start (adapters/told.py).
+    what the gateway is told at the start (adapters/told.py). `declaring`: how people may tell it more; closed at the end.
 
     Raises RunFailure when the archive cannot be written, or the stream does not tell where we are.
     """
@@ -65,17 +67,23 @@ def run_live(
     try:
         run = Run(setup, receiver.started_at)
         with _Abandoning(run), UnhurriedCollection() as collection:
+            if run.folder is not None:
+                declaring.write_into(run.folder)
             receiver.start()
 
             def tick() -> int:
                 collection.collect_when_due()
-                return _tick(receiver, run, watch, manners)
+                lines, notes = declaring.tend(run)
+                for line in lines:
+                    receiver.tell(line)
+                return _tick(receiver, run, watch, manners, notes)
 
             ended = _live(tick, run, seconds, asked_to_stop, no_place_after_s)
             receiver.close()
             _tick(receiver, run, watch, manners, is_last=True)
             return run.finish(ended)
     finally:
+        declaring.close()
         receiver.close()
 
 
@@ -101,10 +109,18 @@ def _live(
         time.sleep(max(0.0, tick_s - (time.monotonic() - tick_began)))
 
 
-def _tick(receiver: Receiver, run: Run, watch: Watch, manners: Manners | None, *, is_last: bool = False) -> int:
+def _tick(
+    receiver: Receiver,
+    run: Run,
+    watch: Watch,
+    manners: Manners | None,
+    notes: tuple[tuple[str, str], ...] = (),
+    *,
+    is_last: bool = False,
+) -> int:
     """Work in what came; where nothing did, the watermark, if it has not been worked in for a while. How much came."""
     delivery = receiver.drain()
-    notes = delivery.notes
+    notes = (*delivery.notes, *notes)
     if manners is not None and not is_last:
         notes = (*notes, *_speak(receiver, delivery, manners))
     is_idle = not (delivery.arrivals or delivery.sources or notes)

@@ -22,6 +22,7 @@ from gateway import __version__
 from gateway.observation import Heard
 from gateway.picture import Picture
 from gateway.pipeline import State, initial, step
+from gateway.predict.told import known_points
 from gateway.runtime.folder import Record, make_folder, remembered_for, session_name
 from gateway.runtime.mutes import Muting
 from gateway.runtime.opening import Opening
@@ -79,6 +80,16 @@ class Run:
     def watermark(self) -> int:
         """How far the session has come, a stamp, ns since 1970 UTC."""
         return self._watermark
+
+    def known_aircraft(self) -> tuple[str, ...]:
+        """Those that have a track."""
+        return () if self._state is None else tuple(sorted(self._state.lanes.by_aircraft))
+
+    def known_points(self, aircraft: str) -> tuple[str, ...]:
+        """Where an aircraft can be declared to go, by name; the items of its plan by number."""
+        if self._state is None:
+            return ()
+        return known_points(self._state.predicting.tellings.by_aircraft.get(aircraft), self._state.site)
 
     def _record_into(self, folder: Path) -> Recorder:
         record = Record(__version__, self.setup.command, self.setup.options, self.started_at)
