@@ -20,6 +20,7 @@ from gateway.estimators.track_splitting_bank import Bank, begun, bounded, carrie
 from gateway.estimators.track_splitting_gates import near
 from gateway.estimators.track_splitting_plots import Sight, along, corrected, spread
 from gateway.estimators.track_splitting_shares import shared
+from gateway.observation import made_swiftly
 
 __all__ = ["Bank", "Plots", "Scan", "Splitting", "scan"]
 
@@ -46,7 +47,7 @@ class Splitting:
     confirm_at: float = 0.999
     end_below: float = 0.05  # a confirmed track
     drop_below: float = 0.3  # one that is not, in parts of what it began with
-    least_weight: float = 0.1  # of a hypothesis within its family
+    least_weight: float = 0.05  # of a hypothesis within its family
     hypotheses: int = 5  # of a family
     budget: int = 4000  # of all hypotheses
 
@@ -77,6 +78,7 @@ class Plots:
         return missing if missing.any() else None
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class Scan:
     """What came of a scan: how much of each plot (m,) no track explains, and what the budget left out."""
@@ -85,6 +87,7 @@ class Scan:
     left_out: int  # hypotheses
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class _Pairs:
     """The p pairs of hypothesis and plot within its gate, in this order; and q states after plots, of which each has one."""
@@ -98,6 +101,7 @@ class _Pairs:
     covariance: Floats  # (2A, 2A, q)
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class _Looked:
     """Which families (f,) a look told of, True = all; and since when each is next looked at."""
@@ -106,6 +110,7 @@ class _Looked:
     at: Ints  # ns
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class _Weighed:
     """How likely all is after a scan: families (f,), hypotheses without a plot (n,) and with one (p,)."""
@@ -250,7 +255,7 @@ def _with_new(bank: Bank, plots: Plots, unexplained: Floats, sight: Sight, model
     """The same with a family for every plot that tells a place and that no track explains."""
     new = (unexplained >= NEW_AT).nonzero()[0]
     whole, position, scatter = sight.placed(plots.value.take(new, axis=1), plots.variance.take(new, axis=1))
-    new = new if whole.all() else new[whole]
+    new = new if whole is None else new[whole]
     axes, count = position.shape
     mean, covariance = np.zeros((2 * axes, count)), np.zeros((2 * axes, 2 * axes, count))
     mean[:axes], covariance[:axes, :axes] = position, scatter

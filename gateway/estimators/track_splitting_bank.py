@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.estimators.track_splitting_gates import near
 from gateway.estimators.track_splitting_plots import moved
 from gateway.observation import made_swiftly
 
@@ -18,7 +17,7 @@ Bools = NDArray[np.bool_]
 SECOND = 1e9
 PATH = 8  # plots of a hypothesis that are remembered
 ALIKE = 0.25  # hypotheses of a family differ by less than half a sigma in every state: they tell the same
-TWINS = 1.0  # families, by less than a sigma, and by a plot that both took lately
+TWINS = 1.0  # families, by less than a sigma, and a plot that both took lately
 LATELY = 4  # looks
 
 
@@ -55,6 +54,14 @@ class Bank:
     def best(self) -> Ints:
         """(f,) the likeliest hypothesis of each family."""
         return np.searchsorted(self.family, np.arange(len(self.number)))
+
+    @property
+    def position(self) -> Floats:
+        """(A, f) where each family is, the mean of its hypotheses."""
+        position = self.mean[: len(self.mean) // 2]
+        if len(self) == len(self.number):
+            return position
+        return np.stack([np.bincount(self.family, self.weight * axis, minlength=len(self.number)) for axis in position])
 
 
 def carried(bank: Bank, at: int, density: tuple[float, ...]) -> Bank:
@@ -139,18 +146,11 @@ def merged(bank: Bank) -> Bank:
 def distinct(bank: Bank) -> Bank:
     """Without families that follow the same thing as another one that is confirmed, or likelier, or older."""
     best = bank.best
-    mean, axes = bank.mean.take(best, axis=1), len(bank.mean) // 2
-    state = np.arange(len(mean))
-    variance = bank.covariance[state, state].take(best, axis=1)
-    position, reach = mean[:axes], TWINS * variance[:axes]
-    one, other = near(position, reach, position, np.zeros_like(reach))
-    apart = one != other
-    one, other = one[apart], other[apart]
-    off = mean.take(one, axis=1) - mean.take(other, axis=1)
-    same = (off * off <= TWINS * variance.take(one, axis=1)).all(axis=0)
-    path = bank.path[:LATELY].take(best, axis=1)
-    shared = path.take(one, axis=1)
-    same &= ((shared == path.take(other, axis=1)) & (shared > 0)).any(axis=0)
+    one, other = _sharing(bank.path[:LATELY].take(best, axis=1))
+    state = np.arange(len(bank.mean))
+    variance = bank.covariance[state, state].take(best.take(one), axis=1)
+    off = bank.mean.take(best.take(one), axis=1) - bank.mean.take(best.take(other), axis=1)
+    same = (off * off <= TWINS * variance).all(axis=0)
     one, other = one[same], other[same]
     confirmed = bank.confirmed.astype(np.int64)
     order = np.lexsort((bank.number, -bank.existence, -confirmed))
@@ -162,6 +162,22 @@ def distinct(bank: Bank) -> Bank:
     gone = np.zeros(len(best), np.bool_)
     gone[worse] = True
     return chosen(bank, bank.weight, np.logical_not(gone.take(bank.family)).nonzero()[0])
+
+
+def _sharing(path: Ints) -> tuple[Ints, Ints]:
+    """Pairs of families, both ways, that have a plot in common; path (p, f), 0 = none."""
+    serial = path.ravel()
+    held = (serial > 0).nonzero()[0]
+    held = held.take(serial.take(held).argsort(kind="stable"))
+    serial, family = serial.take(held), held % path.shape[1]
+    one, other = [family[:0]], [family[:0]]
+    for apart in range(1, len(serial)):
+        same = (serial[apart:] == serial[:-apart]).nonzero()[0]
+        if not len(same):
+            break
+        one.append(family.take(same))
+        other.append(family.take(same + apart))
+    return np.concatenate(one + other), np.concatenate(other + one)
 
 
 def bounded(bank: Bank, budget: int) -> tuple[Bank, int]:

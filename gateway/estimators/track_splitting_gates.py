@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-FEW = 4096  # predictions times plots: up to here comparing all with all is quicker than a grid
+VERY_FEW = 64  # predictions times plots: up to here looking which are near takes longer than taking all of them
+FEW = 4096  # up to here comparing all with all is quicker than a grid
 CELLS_PER_PLOT = 16.0  # of the grid, at most
 WIDER = 1.0 + 1e-9  # what lies on a box's edge is not lost to rounding
 
@@ -16,14 +19,16 @@ WIDER = 1.0 + 1e-9  # what lies on a box's edge is not lost to rounding
 def near(
     expected: Floats, reach: Floats, value: Floats, spread: Floats, turn: float | None = None
 ) -> tuple[Ints, Ints]:
-    """Pairs (prediction, plot), in this order: in no component is the square of their difference more than reach + spread.
+    """Pairs (prediction, plot), in this order: all whose difference, squared, is in no component more than reach + spread.
 
-    expected, value (k, n), (k, m); reach (k, n) and spread (k, m) are squares, as variances are. NaN = not measured, which is
-    near everything. `turn`: after how much the second component is the same again, None = never.
+    Others may be among them. expected (k, n), value (k, m); reach (k, n) and spread (k, m) are squares, as variances are. NaN =
+    not measured, which is near everything. `turn`: after how much the second component is the same again, None = never.
     """
+    n, m = expected.shape[1], value.shape[1]
+    if n * m <= VERY_FEW:
+        return _all(n, m)
     if turn is not None:
         return _all_around(expected, reach, value, spread, turn)
-    n, m = expected.shape[1], value.shape[1]
     if n * m <= FEW:
         return _all_with_all(expected, reach, value, spread)
     partial = np.isnan(value[:2]).any(axis=0)
@@ -38,8 +43,6 @@ def near(
 def _all_around(expected: Floats, reach: Floats, value: Floats, spread: Floats, turn: float) -> tuple[Ints, Ints]:
     """The same where the second component is an angle: plots near its ends are looked at from both."""
     m = value.shape[1]
-    if not m or not expected.shape[1]:
-        return near(expected, reach, value, spread)
     margin = float(np.sqrt(reach[1].max() + np.fmax.reduce(spread[1], initial=0.0)))
     low, high = float(expected[1].min()) - margin, float(expected[1].max()) + margin
     again = [(value[1] + way >= low) & (value[1] + way <= high) for way in (-turn, turn)]
@@ -57,7 +60,14 @@ def _all_around(expected: Floats, reach: Floats, value: Floats, spread: Floats, 
 def _in_order(row: Ints, plot: Ints, plots: int) -> tuple[Ints, Ints]:
     """Pairs in order, each once."""
     key = np.unique(row * plots + plot)
-    return np.divmod(key, max(plots, 1))
+    return np.divmod(key, plots)
+
+
+@lru_cache(maxsize=256)
+def _all(n: int, m: int) -> tuple[Ints, Ints]:
+    row, plot = np.divmod(np.arange(n * m), max(m, 1))
+    row.flags.writeable = plot.flags.writeable = False
+    return row, plot
 
 
 def _all_with_all(expected: Floats, reach: Floats, value: Floats, spread: Floats) -> tuple[Ints, Ints]:
@@ -71,8 +81,8 @@ def _by_grid(expected: Floats, reach: Floats, value: Floats, spread: Floats) -> 
     """Plots sorted into narrow cells of the first component in wide bands of the second; what a prediction's box covers of
     a band is one run of plots."""
     m = value.shape[1]
-    if not m or not expected.shape[1]:
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    if not m:
+        return _all(len(expected[0]), 0)
     box = WIDER * np.sqrt(reach[:2] + spread[:2].max(axis=1)[:, None])
     origin = value[:2].min(axis=1)[:, None]
     extent = value[:2].max(axis=1)[:, None] - origin

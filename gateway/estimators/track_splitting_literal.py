@@ -99,7 +99,7 @@ def begin(plots: Plots, at: int, sight: Sight, model: Printed) -> Tracks:
     mean = np.concatenate([position, np.zeros_like(position)])
     begun = np.full(count, -1)
     recent = np.zeros((ALIKE, count), np.int64)
-    recent[0] = plots.serial[whole]
+    recent[0] = plots.serial if whole is None else plots.serial[whole]
     return Tracks(at, mean, covariance, likelihood, np.zeros(count), likelihood, recent, begun, 1)
 
 

@@ -31,8 +31,8 @@ class Sight(Protocol):
     def off(self, value: Floats, expected: Floats) -> Floats:
         """Differences (k, n) of what was measured and what was expected; angles the short way round."""
 
-    def placed(self, value: Floats, variance: Floats) -> tuple[Bools, Floats, Floats]:
-        """Which plots (m,) tell a place; and of these the positions (A, b) and covariances (A, A, b)."""
+    def placed(self, value: Floats, variance: Floats) -> tuple[Bools | None, Floats, Floats]:
+        """Which plots (m,) tell a place, None = all; and of these the positions (A, b) and covariances (A, A, b)."""
 
 
 class Plane:
@@ -48,10 +48,11 @@ class Plane:
         """Their differences."""
         return value - expected
 
-    def placed(self, value: Floats, variance: Floats) -> tuple[Bools, Floats, Floats]:
+    def placed(self, value: Floats, variance: Floats) -> tuple[Bools | None, Floats, Floats]:
         """Where all axes are measured."""
-        whole: Bools = np.logical_not(np.isnan(value).any(axis=0))
-        if not whole.all():
+        whole: Bools | None = None
+        if (missing := np.isnan(value)).any():
+            whole = np.logical_not(missing.any(axis=0))
             value, variance = value[:, whole], variance[:, whole]
         axes, count = value.shape
         covariance = np.zeros((axes, axes, count))
@@ -114,7 +115,7 @@ def corrected(
     """
     half, before = len(mean) // 2, mean[: len(mean) // 2]
     distance: Floats | float = 0.0
-    volume: Floats | float = 1.0
+    volume: Floats | float = TAU ** len(off)
     for component, residual in enumerate(off):
         cross = along(slope, component, covariance[:half])
         if component:
@@ -125,12 +126,12 @@ def corrected(
         scatter = variance[component] + along(slope, component, cross[:half])
         if lead_s is not None:
             scatter += lead_s * along(slope, component, cross[half:])
-        gain, scaled = cross / scatter, TAU * scatter
+        gain = cross / scatter
         if missing is not None and (nothing := missing[component]).any():
-            gain[:, nothing], scaled[nothing] = 0.0, 1.0
-            residual, scatter = np.where(nothing, 0.0, residual), np.where(nothing, 1.0, scatter)
+            gain[:, nothing] = 0.0
+            residual, scatter = np.where(nothing, 0.0, residual), np.where(nothing, 1.0 / TAU, scatter)
         distance = distance + residual * residual / scatter
-        volume = volume * scaled
+        volume = volume * scatter
         mean = mean + gain * residual
         covariance = covariance - gain[:, None] * cross
     return mean, covariance, np.asarray(distance), np.exp(-0.5 * distance) / np.sqrt(volume)

@@ -20,7 +20,6 @@ BUDGET = 2000  # hypotheses of a radar
 SURE = 0.5  # a plot is told of a family that has it with more than this weight
 SURE_SIGMAS = 4.5  # of a speed: three in a million, because dozens of birds are asked after every scan
 CONFIRM_AT = 0.9999
-LEAST_WEIGHT = 0.05  # of a hypothesis: few targets, so there is time for more of them
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,7 +96,6 @@ def _splitting(density: Density, options: Options) -> Splitting:
         speeds,
         density.detection,
         confirm_at=CONFIRM_AT,
-        least_weight=LEAST_WEIGHT,
         budget=BUDGET,
     )
 

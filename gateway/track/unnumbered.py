@@ -12,7 +12,7 @@ the radar's numbered plots.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 
 from gateway.align import SECOND, Plot
@@ -186,11 +186,21 @@ def _difference(
         if family not in numbers:
             numbers[family] = following
             following += 1
-    by_serial = {plot.serial: plot for one in watch.slices for plot in one.plots}
-    new = [serial for serial, family in told.items() if was.get(serial) != family and serial in by_serial]
-    gone = [serial for serial, family in was.items() if told.get(serial) != family and serial in by_serial]
-    some = sorted((replace(by_serial[one], number=numbers[told[one]]) for one in new), key=order_of)
-    back = sorted((replace(by_serial[one], number=numbers[was[one]]) for one in gone), key=order_of)
+    new = {serial for serial, family in told.items() if was.get(serial) != family}
+    gone = {serial for serial, family in was.items() if told.get(serial) != family}
+    by_serial = _plots_of(watch.slices, new | gone)
+    some = sorted((replace(by_serial[one], number=numbers[told[one]]) for one in new & by_serial.keys()), key=order_of)
+    back = sorted((replace(by_serial[one], number=numbers[was[one]]) for one in gone & by_serial.keys()), key=order_of)
     untold = sum(plot.serial not in told for plot in heard)
     crowded = (heard[0].radar,) if any(one.crowded for one in after) else ()
     return replace(watch, numbers=numbers, next_number=following), Taken(tuple(some), tuple(back), untold, crowded)
+
+
+def _plots_of(slices: Sequence[Slice], serials: Set[int]) -> dict[int, Plot]:
+    """These plots by their serials, those that are remembered: mostly they are of the last slices."""
+    found: dict[int, Plot] = {}
+    for one in reversed(slices):
+        if len(found) == len(serials):
+            break
+        found |= {plot.serial: plot for plot in one.plots if plot.serial in serials}
+    return found

@@ -46,10 +46,9 @@ def shipped(model: Splitting = Splitting(DENSITY, GREATEST_SPEED_MPS)) -> Tracke
         began = time.perf_counter()
         bank, _ = scan(bank, plots, at, Plane(), model)
         spent_s = time.perf_counter() - began
-        told, families = bank.confirmed, len(bank.number)
-        mean = np.array([np.bincount(bank.family, bank.weight * one, minlength=families) for one in bank.mean[:2]])
+        told = bank.confirmed
         hypotheses = int(told[bank.family].sum())
-        return Seen(mean[:, told], bank.number[told], bank.existence[told], hypotheses, len(bank), spent_s)
+        return Seen(bank.position[:, told], bank.number[told], bank.existence[told], hypotheses, len(bank), spent_s)
 
     return after
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from gateway.estimators import track_splitting_literal as literal
 from gateway.estimators.track_splitting import Bank, Plots, Splitting, scan
+from gateway.estimators.track_splitting_bank import distinct
 from gateway.estimators.track_splitting_gates import near
 from gateway.estimators.track_splitting_plots import Plane, corrected, moved
 from gateway.estimators.track_splitting_shares import shared
@@ -119,10 +122,33 @@ def test_the_grid_finds_what_all_with_all_finds(partial: float) -> None:
 
 def test_an_angle_is_near_from_both_ends() -> None:
     """Plots just beyond half a turn lie near predictions just before it, each pair once."""
-    expected, reach = np.array([[1000.0, 1000.0], [3.13, 0.0]]), np.full((2, 2), 0.05**2)
+    expected, reach = np.full((2, 40), 9e9), np.full((2, 40), 0.05**2)
+    expected[:, :2] = [[1000.0, 1000.0], [3.13, 0.0]]
     value = np.array([[1000.0, 1000.0, 1000.0], [-3.14, 3.12, 0.01]])
     row, plot = near(expected, reach, value, np.zeros_like(value), 2.0 * np.pi)
     assert list(zip(row.tolist(), plot.tolist(), strict=True)) == [(0, 0), (0, 1), (1, 2)]
+
+
+def test_what_lies_near_is_among_the_pairs_of_few_and_of_many() -> None:
+    """From one prediction and plot to hundreds, every way of looking finds the pairs that lie within reach."""
+    random = np.random.default_rng(8)
+    for n, m in ((1, 1), (5, 9), (40, 60), (200, 300), (7, 0), (0, 7), (3000, 2)):
+        expected, value = random.uniform(-1e3, 1e3, (2, n)), random.uniform(-1e3, 1e3, (2, m))
+        reach, spread = random.uniform(0.0, 4e4, (2, n)), random.uniform(0.0, 4e3, (2, m))
+        apart = (expected[:, :, None] - value[:, None, :]) ** 2 > reach[:, :, None] + spread[:, None, :]
+        wanted = set(zip(*(one.tolist() for one in np.nonzero(~apart.any(axis=0))), strict=True))
+        found = list(zip(*(one.tolist() for one in near(expected, reach, value, spread)), strict=True))
+        assert found == sorted(set(found))
+        assert wanted <= set(found)
+
+
+def test_of_families_that_follow_one_thing_one_is_left() -> None:
+    """Three in nearly the same state that took a plot in common: the confirmed one stays; one that took another, too."""
+    bank = worked([[[0.0, 0.0], [5.0, 5.0], [10.0, 0.0], [6.0, 2.0]]])
+    path = bank.path.copy()
+    path[0] = [1, 1, 1, 9]
+    alike = replace(bank, path=path, confirmed=np.array([False, True, False, False]))
+    assert distinct(alike).number.tolist() == [2, 4]
 
 
 def test_components_one_by_one_are_the_kalman_update() -> None:
