@@ -281,6 +281,8 @@ class Work(Reckoning):
             self.geoid.separation_m,
         )
         self.forecasts.append(made)
+        if made.judged is not None:
+            self.events += [Event(at, level, text) for level, text in made.judged.said]
         self.probing = self.probing.hearing(made.ways, at, self.options.prediction_period_s)
 
     def _probe(self, at: int) -> None:

@@ -16,6 +16,7 @@ from gateway.fuse import Lane
 from gateway.fuse.weighting import Model
 from gateway.predict import weather
 from gateway.predict.choosing import Chosen, chosen
+from gateway.predict.gates import Gates, Judged
 from gateway.predict.heights import heights
 from gateway.predict.predicting import Predicting
 from gateway.predict.spread import (
@@ -59,6 +60,7 @@ def forecast(
     tracks = tuple(lane.track for lane in lanes)
     before = predicting.remembered.of(tracks)
     state = State.of(lanes, at, model)
+    gates, judged = _on_final(predicting.gates, lanes, at, state, site, frame)
     goals = weather.around(goals, state, weather.areas(predicting.tellings, site, frame, at, separation_m))
     usual = level_turn_rate(state.speed, site.estimation.bank_rad, site.estimation.turn_rate_rps)
     winds = _winds(predicting, lanes, at)
@@ -105,8 +107,21 @@ def forecast(
         way.kind,
         way.confidence,
         ways,
+        judged,
     )
-    return replace(predicting, remembered=predicting.remembered.after(tracks, minds)), made
+    return replace(predicting, remembered=predicting.remembered.after(tracks, minds), gates=gates), made
+
+
+def _on_final(
+    gates: Gates, lanes: Sequence[Lane], at: int, state: State, site: Site, frame: RunwayFrame
+) -> tuple[Gates, Judged | None]:
+    """Who of some tracks is not stabilised on final."""
+    place = np.concatenate([state.position, (state.up + state.climb * state.since_s)[:, None]], axis=1)
+    velocity = np.concatenate([state.velocity, state.climb[:, None]], axis=1)
+    numbers = [lane.number for lane in lanes]
+    names = [f"track {lane.number}" + (f" ({lane.aircraft})" if lane.aircraft else "") for lane in lanes]
+    tracks = [lane.track for lane in lanes]
+    return gates.judged(at, tracks, numbers, names, place, velocity, state.has_height, site.stabilised, frame)
 
 
 def _rests(way: Chosen, whole: two_segment.Ahead) -> Ints:

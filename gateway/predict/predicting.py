@@ -9,6 +9,7 @@ from gateway.align import SECOND
 from gateway.frames import RunwayFrame
 from gateway.fuse import Lane
 from gateway.observation import WeatherArea
+from gateway.predict.gates import Gates
 from gateway.predict.goals import Goals, goals_of
 from gateway.predict.minds import Remembered
 from gateway.predict.told import Said, Tellings
@@ -27,6 +28,7 @@ class Predicting:
     goals: Mapping[str | None, Goals] = field(default_factory=dict)  # by aircraft; None: of those that said nothing
     separation_m: float = 0.0  # of the geoid, as the goals have it
     planned: tuple[tuple[int, tuple[int, ...]], ...] = ()  # when which tracks are predicted next
+    gates: Gates = Gates()  # what is remembered of finals
 
     @property
     def due(self) -> int:
@@ -79,5 +81,5 @@ class Predicting:
             goals = {one: goal for one, goal in goals.items() if one is None or one in tellings.by_aircraft}
         if not lanes:
             return Predicting(tellings)
-        remembered = self.remembered.without(lanes)
-        return replace(self, tellings=tellings, goals=goals, remembered=remembered)
+        remembered, gates = self.remembered.without(lanes), self.gates.without(lanes)
+        return replace(self, tellings=tellings, goals=goals, remembered=remembered, gates=gates)

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND
 from gateway.frames import RunwayFrame, turn
-from gateway.predict import conflicts
+from gateway.predict import conflicts, gates
 from gateway.predict.conflicts import NONE_FOUND, Conflicts
+from gateway.predict.gates import NONE_JUDGED, GateAlerts
 from gateway.predict.ways import Ways
 
 Floats = NDArray[np.float64]
@@ -46,6 +47,7 @@ class Predicted:
     sigma_across_m: Floats
     course_rad: Floats  # compass course there
     conflicts: Conflicts = NONE_FOUND
+    gates: GateAlerts = NONE_JUDGED
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,6 +67,7 @@ class Forecast:
     kind: Ints  # (t,) 0 none, 1 inferred, 2 declared
     confidence: Floats  # (t,)
     ways: Ways
+    judged: gates.Judged | None = None
 
 
 def table(forecasts: Sequence[Forecast], frame: RunwayFrame, rounds: Sequence[conflicts.Round] = ()) -> Predicted:
@@ -96,6 +99,7 @@ def table(forecasts: Sequence[Forecast], frame: RunwayFrame, rounds: Sequence[co
         sigma_across_m=across,
         course_rad=np.remainder(0.5 * math.pi - _joined([f.course for f in forecasts]), 2.0 * math.pi),
         conflicts=conflicts.table(rounds, frame) if rounds else NONE_FOUND,
+        gates=gates.table([one.judged for one in forecasts if one.judged is not None]),
     )
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from gateway.frames import RunwayFrame
 from gateway.picture import Picture
 from gateway.predict import Predicted
+from gateway.predict.approach import deviations
 from gateway.settings import Site
-from gateway.sinks.approach import deviations
 from gateway.sinks.scene import columns, style
 from gateway.sinks.scene.entry import Always, Entry, entity
 from gateway.sinks.scene.flown import Flock, Flown

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from gateway.predict.approach import deviations
 from gateway.settings import DEMO_SITE
-from gateway.sinks.approach import deviations
 
 RUNWAY = DEMO_SITE.runway
 
