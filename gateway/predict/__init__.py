@@ -7,6 +7,7 @@ to round, `minds` that of each track. `ways` are the predictions as paths on one
 near each other, `conflicts` what is told of that.
 """
 
+from gateway.predict.candidates import Candidates
 from gateway.predict.conflicts import Conflicts, Probing, Round, sentence
 from gateway.predict.forecasting import forecast
 from gateway.predict.predicting import TOGETHER, Predicting
@@ -15,6 +16,7 @@ from gateway.predict.told import Said
 
 __all__ = [
     "TOGETHER",
+    "Candidates",
     "Conflicts",
     "Forecast",
     "Predicted",

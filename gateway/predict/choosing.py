@@ -42,6 +42,7 @@ class Chosen:
     best: Ints  # (n,) the candidate that is told, -1 = none
     kind: Ints
     confidence: Floats
+    share: Floats  # (n, c) of each candidate; the rest goes elsewhere
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,8 +140,18 @@ def chosen(
         best,
         kind,
         confidence,
+        _shares(belief.share, declared.place, trust),
     )
     return way, minds
+
+
+def _shares(inferred_share: Floats, declared: Ints, trust: Floats) -> Floats:
+    """How probably (n, c) each candidate is flown to: what is declared as far as it is trusted, the others share the rest."""
+    rest = np.where(declared >= 0, 1.0 - np.nan_to_num(trust), 1.0)
+    share = np.nan_to_num(inferred_share) * rest[:, None]
+    said = np.flatnonzero(declared >= 0)
+    share[said, declared[said]] = trust[said]
+    return np.asarray(share)
 
 
 def _inferred(

@@ -15,6 +15,7 @@ from gateway.frames import RunwayFrame
 from gateway.fuse import Lane
 from gateway.fuse.weighting import Model
 from gateway.predict import weather
+from gateway.predict.candidates import weighed
 from gateway.predict.choosing import Chosen, chosen
 from gateway.predict.gates import Gates, Judged
 from gateway.predict.heights import heights
@@ -108,6 +109,7 @@ def forecast(
         way.confidence,
         ways,
         judged,
+        weighed(at, tracks_told, goals, way.share),
     )
     return replace(predicting, remembered=predicting.remembered.after(tracks, minds), gates=gates), made
 

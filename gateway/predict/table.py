@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND
 from gateway.frames import RunwayFrame, turn
-from gateway.predict import conflicts, gates
+from gateway.predict import candidates, conflicts, gates
+from gateway.predict.candidates import NO_CANDIDATES, Candidates, Weighed
 from gateway.predict.conflicts import NONE_FOUND, Conflicts
 from gateway.predict.gates import NONE_JUDGED, GateAlerts
 from gateway.predict.ways import Ways
@@ -48,6 +49,7 @@ class Predicted:
     course_rad: Floats  # compass course there
     conflicts: Conflicts = NONE_FOUND
     gates: GateAlerts = NONE_JUDGED
+    candidates: Candidates = NO_CANDIDATES
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +70,7 @@ class Forecast:
     confidence: Floats  # (t,)
     ways: Ways
     judged: gates.Judged | None = None
+    weighed: Weighed | None = None
 
 
 def table(forecasts: Sequence[Forecast], frame: RunwayFrame, rounds: Sequence[conflicts.Round] = ()) -> Predicted:
@@ -100,6 +103,7 @@ def table(forecasts: Sequence[Forecast], frame: RunwayFrame, rounds: Sequence[co
         course_rad=np.remainder(0.5 * math.pi - _joined([f.course for f in forecasts]), 2.0 * math.pi),
         conflicts=conflicts.table(rounds, frame) if rounds else NONE_FOUND,
         gates=gates.table([one.judged for one in forecasts if one.judged is not None]),
+        candidates=candidates.table([one.weighed for one in forecasts if one.weighed is not None], frame),
     )
 
 

@@ -16,6 +16,7 @@ from gateway.sinks.blueprint import blueprint
 from gateway.sinks.feed import FileFeed, Identity, ServedFeed
 from gateway.sinks.hold import Hold
 from gateway.sinks.recording import optimise
+from gateway.sinks.scene.believed import BelievedScene
 from gateway.sinks.scene.clutter import ClutterScene
 from gateway.sinks.scene.conflicts import ConflictScene
 from gateway.sinks.scene.entry import Entry, made
@@ -79,6 +80,7 @@ class RerunSink:
         self._scope, self._health, self._plans = ScopeScene(site), HealthScene(), PlanScene(site)
         self._smoothed, self._register, self._radars = SmoothedScene(site), RegisterScene(site), MultiRadarScene(site)
         self._clutter, self._conflicts = ClutterScene(), ConflictScene(site)
+        self._believed = BelievedScene(site)
         self._period_ns, self._rows_limit = round(period_s * 1e9), rows_limit
         self._rest_ns = self._period_ns
         self._waiting: list[Picture] = []
@@ -161,6 +163,7 @@ class RerunSink:
             *self._approach.entries(flights),
             *self._predict.entries(pictures, flights),
             *self._conflicts.entries(pictures),
+            *self._believed.entries(pictures),
             *self._stages.entries(pictures, flights, self._flights.newest),
             *self._register.entries(pictures),
             *self._health.entries(pictures),
@@ -170,6 +173,7 @@ class RerunSink:
             for ended in picture.fuse.ended:
                 self._flights.end(ended.track, picture.now)
                 self._predict.end(ended.track, picture.now)
+                self._believed.end(ended.track)
                 self._tracks.forget(ended.track)
         entries = self._rested(entries)
         self._send(entries)

@@ -17,7 +17,9 @@ SMOOTHED: Colour = (90, 235, 235)  # what later measurements made of it
 
 TRUTH: Colour = (150, 150, 150)
 PREDICTED: Colour = (255, 140, 160)
+CANDIDATE: Colour = (255, 190, 205)
 CONFLICT: Colour = (255, 60, 220)
+ALERT: Colour = (255, 60, 220)
 PLAN: Colour = (150, 190, 120)
 NEXT: Colour = (190, 255, 120)
 JOINED: Colour = (255, 230, 80)

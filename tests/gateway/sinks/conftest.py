@@ -6,7 +6,7 @@ import math
 import warnings
 from collections import defaultdict
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import MISSING, replace
 from pathlib import Path
 from typing import Any
 
@@ -240,7 +240,7 @@ def registered(now: int) -> Registered:
 
 def slice_predicted(predicted: Predicted, rows: int) -> Predicted:
     """The first rows of a prediction."""
-    names = Predicted.__dataclass_fields__
+    names = [name for name, one in Predicted.__dataclass_fields__.items() if one.default is MISSING]
     return Predicted(**{name: getattr(predicted, name)[:rows] for name in names})
 
 
