@@ -6,6 +6,7 @@ it is the same whatever came first.
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.estimators.inertial import from_angles
 from gateway.observation import AirData, Attitude, ImuSample, Many, Observation
 
 Floats = NDArray[np.float64]
@@ -135,9 +135,23 @@ def _of_one(one: ImuSample | Attitude | AirData) -> Sequence[tuple[int, tuple[fl
             return ()
         return ((INERTIAL, (*one.acceleration_mps2, *one.angular_rate_radps, float(one.sensor))),)
     if isinstance(one, Attitude):
-        return ((ATTITUDE, tuple(from_angles(one.roll_rad, one.pitch_rad, one.yaw_rad).tolist())),)
+        return ((ATTITUDE, _quaternion(one)),)
     told = ((AIRSPEED, one.airspeed_mps), (ALTITUDE, one.altitude_msl_m))
     return tuple((kind, (value,)) for kind, value in told if value is not None)
+
+
+def _quaternion(one: Attitude) -> tuple[float, ...]:
+    """As `inertial.from_angles`: one by one, since what is told in other portions must be the same, and without arrays, which
+    take ten times as long for one.
+    """
+    halves = 0.5 * one.roll_rad, 0.5 * one.pitch_rad, 0.5 * one.yaw_rad
+    (sr, sp, sy), (cr, cp, cy) = map(math.sin, halves), map(math.cos, halves)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
 
 
 def _of_many(many: Many) -> Iterable[tuple[tuple[str, int], Series]]:
