@@ -85,7 +85,9 @@ class _Hearing:
         self.gathered.close()
 
     def _state(self) -> _State:
-        """What the reading of frames that wait depends on, beside their senders' clocks; and whether none may wait."""
+        """What the reading of frames that wait depends on, beside their senders' clocks; and whether none may wait, or be gathered:
+        at another speed a second of stamps is not one of the session, and dead reckoning goes by those.
+        """
         by = self._by
         none_may = by.epoch.offset_s is None or by.epoch.speed != 1.0 or by.plans.waits
         return by.mavlink.registry.version, by.epoch.anchor, none_may
@@ -100,7 +102,7 @@ class _Hearing:
             waiting.at = place
             if sender < 0:
                 self._hear(place, arrival, head)
-            elif passes and self._by.epoch.offset_s is not None and not self._by.plans.waits:
+            elif passes and not self._state()[-1]:
                 self._gather(place, arrival, components[sender], head >> 24)
             else:
                 heard = self._by.hear_counted(arrival, components[sender], head >> 24)

@@ -15,7 +15,7 @@ from gateway.reckon import NOTHING, Easing, Reckoned, reads
 
 SURE_SIGMA = 6.0
 TURNED_MPS2 = 10.0  # the acceleration may have changed by so much since dead reckoning came so far
-EASES_MPS, EASES_AT_LEAST_S, EASES_AT_MOST_S = 5.0, 2.0, 20.0
+EASES_MPS, EASES_AT_LEAST_S, EASES_AT_MOST_S = 20.0, 2.0, 5.0
 
 
 class Believing(Making):

@@ -78,23 +78,44 @@ def started(
 
 
 def carried_on(
+    state: Reckoning, rate_radps: ArrayLike, force_mps2: ArrayLike, interval_s: ArrayLike, unit: Unit = Unit()
+) -> Reckoning:
+    """One interval later, of its mean angular rate and specific force (..., 3) as the unit measured them."""
+    rate, force = np.asarray(rate_radps, dtype=np.float64), np.asarray(force_mps2, dtype=np.float64)
+    return carried_through(state, rate[..., None, :], force[..., None, :], interval_s, unit)
+
+
+def carried_through(
     state: Reckoning,
-    rate_radps: ArrayLike,
-    force_mps2: ArrayLike,
+    rates_radps: Floats,
+    forces_mps2: Floats,
     interval_s: ArrayLike,
     unit: Unit = Unit(),
     more: tuple[Floats, Floats] | None = None,
 ) -> Reckoning:
-    """One interval later, of its mean angular rate and specific force (..., 3) as the unit measured them.
+    """Some equal intervals later, of each one's mean rate and force (..., m, 3): motion by motion, the covariance at once.
 
     `more`: noises of rate and force (..., 3) in a root Hz, along the body, beyond the unit's.
     """
+    count = rates_radps.shape[-2]
     step = np.broadcast_to(np.asarray(interval_s, dtype=np.float64), np.shape(state.motion.height_m))
-    rate = np.asarray(rate_radps, dtype=np.float64) - state.rate_bias_radps
-    force = np.asarray(force_mps2, dtype=np.float64) - state.force_bias_mps2
-    motion = advanced(state.motion, rate, force, step)
-    body = matrix(state.motion.attitude)
-    felt = (body @ force[..., None])[..., 0]
+    motion, body, felt = state.motion, np.zeros(()), np.zeros(())
+    for place in range(count):
+        rate = rates_radps[..., place, :] - state.rate_bias_radps
+        force = forces_mps2[..., place, :] - state.force_bias_mps2
+        turned = matrix(motion.attitude)
+        body, felt = body + turned / count, felt + (turned @ force[..., None])[..., 0] / count
+        motion = advanced(motion, rate, force, step)
+    covariance = _covariance_after(state.covariance, body, felt, step * count, unit)
+    if more is not None:
+        for part, noise in ((ATTITUDE, more[0]), (VELOCITY, more[1])):
+            whole = body * (noise**2 * (step * count)[..., None])[..., None, :]
+            covariance[..., part, part] += whole @ np.swapaxes(body, -1, -2)
+    return replace(state, motion=motion, covariance=covariance)
+
+
+def _covariance_after(covariance: Floats, body: Floats, felt: Floats, step: Floats, unit: Unit) -> Floats:
+    """The covariance a while (...,) later, of the mean attitude (..., 3, 3) and the mean force felt (..., 3) in it."""
     across = np.zeros((*step.shape, STATES, STATES))
     across[..., :, :] = _EYE
     whole, half = step[..., None, None], 0.5 * step[..., None, None]
@@ -103,15 +124,10 @@ def carried_on(
     across[..., PLACE, ATTITUDE], across[..., PLACE, FORCE] = tilt * half, lean * half
     across[..., VELOCITY, ATTITUDE], across[..., VELOCITY, FORCE] = tilt, lean
     across[..., ATTITUDE, GYRO] = lean
-    covariance = across @ state.covariance @ np.swapaxes(across, -1, -2)
-    covariance[..., range(STATES), range(STATES)] += _shaken(unit) * step[..., None]
-    covariance[..., range(3), range(3)] += unit.force_noise**2 * step[..., None] ** 3 / 3.0
-    if more is not None:
-        for part, noise in ((ATTITUDE, more[0]), (VELOCITY, more[1])):
-            covariance[..., part, part] += (body * (noise**2 * step[..., None])[..., None, :]) @ np.swapaxes(
-                body, -1, -2
-            )
-    return replace(state, motion=motion, covariance=covariance)
+    later = across @ covariance @ np.swapaxes(across, -1, -2)
+    later[..., range(STATES), range(STATES)] += _shaken(unit) * step[..., None]
+    later[..., range(3), range(3)] += unit.force_noise**2 * step[..., None] ** 3 / 3.0
+    return np.asarray(later)
 
 
 def _shaken(unit: Unit) -> Floats:

@@ -21,6 +21,7 @@ Bools = NDArray[np.bool_]
 CELL_NS = 100_000_000
 CELL_S = CELL_NS / 1e9
 SECOND_CELLS = 10
+BLOCK = 5  # cells that the filters go through at once: what is told in one counts at its end
 PAST_CELLS = 20
 GAP_NS = 500_000_000  # between two samples of the unit: beyond it nobody knows how it moved
 
@@ -37,7 +38,7 @@ class Cells:
     attitude: Floats  # (n, 4)
     airspeed_mps: Floats  # (n,) indicated
     altitude_m: Floats  # (n,)
-    place: Floats  # (n, 9), see `told.PLACE`: of each second the first position
+    place: Floats  # (n, 9), see `told.PLACE`: of each half second the first position
     place_late_s: Floats  # (n,)
     pictured: Floats  # (n, 9)
     pictured_late_s: Floats  # (n,)
@@ -59,7 +60,7 @@ def covered_until(told: Told, first: int) -> int:
         return first
     gaps = np.flatnonzero(np.diff(at[begin:]) > GAP_NS)
     last = int(at[begin + gaps[0]] if len(gaps) else at[-1])
-    return max(last // CELL_NS, first)
+    return max(last // CELL_NS // BLOCK * BLOCK, first)
 
 
 def first_covered(told: Told, after: int) -> int:
@@ -77,8 +78,8 @@ def cells(told: Told, first: int, end: int) -> Cells:
     attitude, rate, is_told = _attitudes(told, means[:, 3:6], first, n)
     unseen = _unseen(inertial, first, n)
     unseen[is_told, 3:] = 0.0
-    place, place_late = _first_of_seconds(told.places, first, n)
-    pictured, pictured_late = _first_of_seconds(told.pictured, first, n)
+    place, place_late = _first_of_blocks(told.places, first, n)
+    pictured, pictured_late = _first_of_blocks(told.pictured, first, n)
     airspeed, altitude = (_last(told.series[kind], first, n)[0][:, 0] for kind in (AIRSPEED, ALTITUDE))
     return Cells(
         first,
@@ -154,14 +155,14 @@ def _last(series: Series, first: int, n: int) -> tuple[Floats, Floats]:
     return values, late
 
 
-def _first_of_seconds(series: Series, first: int, n: int) -> tuple[Floats, Floats]:
-    """The first values of each whole second, in their cells (n, k), and how long before the cell's end, s; NaN = none."""
+def _first_of_blocks(series: Series, first: int, n: int) -> tuple[Floats, Floats]:
+    """The first values of each block, in their cells (n, k), and how long before the cell's end, s; NaN = none."""
     values, late = np.full((n, PLACE), np.nan), np.full(n, np.nan)
     begin, over = series.between(first * CELL_NS, (first + n) * CELL_NS)
     at = series.at[begin:over]
-    second = at // 1_000_000_000
-    before = int(series.at[begin - 1]) // 1_000_000_000 if begin else -1
-    chosen = np.flatnonzero(second != np.concatenate([[before], second[:-1]]))
+    block = at // (BLOCK * CELL_NS)
+    before = int(series.at[begin - 1]) // (BLOCK * CELL_NS) if begin else -1
+    chosen = np.flatnonzero(block != np.concatenate([[before], block[:-1]]))
     cell = at[chosen] // CELL_NS - first
     values[cell] = series.values[begin:over][chosen]
     late[cell] = ((cell + first + 1) * CELL_NS - at[chosen]) / 1e9

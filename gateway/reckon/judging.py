@@ -23,12 +23,13 @@ from gateway.settings import DeadReckoning
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-FAR = 36.8  # chi-square of two degrees, passed once in 10^8: of ten hours with four tests a second one in a thousand is
-NEAR = 9.2  # and once in a hundred
-AGREES_FOR = 5  # positions in a row, a second apart, until one that was refused is believed
+FAR = 43.6  # chi-square of four degrees, passed once in 10^8: ten hours have 72 000 positions
+WALKED = 33.4  # once in 10^6: they have 7200 hypotheses
+NEAR = 13.3  # once in a hundred
+AGREES_FOR = 10  # positions in a row, half a second apart, until one that was refused is believed
 TRUSTED_AFTER = 30 * SECOND_CELLS  # since it began: before that it has not learnt its own errors
 OLD_ENOUGH = 4 * SECOND_CELLS  # a hypothesis without GPS that denies
-WANDERS_M, WANDERS_MPS = 2.0, 0.3  # what good sources' errors change by within half a minute
+WANDERS_M, WANDERS_MPS = 1.5, 0.15  # what good sources' errors change by within half a minute
 LEAST_M, LEAST_MPS = 0.5, 0.1  # of the scatter that a source is taken to have
 MOST_TIMES = 10.0  # the least, or what is stated if that is more: no source is taken to scatter by more
 LEARNS = 0.05  # of each position, for the scatter
@@ -44,14 +45,11 @@ def judged(tip: Tip, place: Floats, late_s: Floats, settings: DeadReckoning) -> 
     latitude, longitude, _ = told
     off = between(latitude, longitude, height, motion) + motion.velocity_mps * late
     faster = place[:, None, 3:6] + tip.accelerated_mps2[:, None] * late - motion.velocity_mps
-    by_place = _square(off[..., :2], tip.state.covariance[..., 0:2, 0:2], tip.scatter_m2, WANDERS_M)
-    by_speed = _square(faster[..., :2], tip.state.covariance[..., 3:5, 3:5], tip.scatter_mps2, WANDERS_MPS)
-    by_speed = np.where(np.isnan(by_speed), 0.0, by_speed)
-    worst = np.maximum(by_place, by_speed)
+    worst = _square(off[..., :2], faster[..., :2], tip)
     trusted = (tip.cell - tip.began >= TRUSTED_AFTER) & np.array(settings.refuses)
     jumps = trusted & (worst[:, 0] > FAR)
     old = tip.cell[:, None] - tip.seeded[:, 1:] >= OLD_ENOUGH
-    walks = trusted[:, None] & old & (worst[:, 1:] > FAR)
+    walks = trusted[:, None] & old & (worst[:, 1:] > WALKED)
     refused = tip.denied != NOTHING
     agreed = np.where(refused & (worst[:, 0] < NEAR), tip.agreed + 1, 0)
     returns = refused & (agreed >= AGREES_FOR)
@@ -66,12 +64,21 @@ def judged(tip: Tip, place: Floats, late_s: Floats, settings: DeadReckoning) -> 
     return tip.put(accepted, _worked_in(tip.taken(accepted), off[accepted, 0], faster[accepted, 0], place[accepted]))
 
 
-def _square(off: Floats, known: Floats, scatter: Floats, wanders: float) -> Floats:
-    """Squared Mahalanobis distances (n, h) of level vectors (n, h, 2)."""
-    more = (np.maximum(scatter, 0.0) + wanders**2)[:, None]
-    a, b, c = known[..., 0, 0] + more, known[..., 0, 1], known[..., 1, 1] + more
-    x, y = off[..., 0], off[..., 1]
-    return np.asarray((c * x * x - 2.0 * b * x * y + a * y * y) / (a * c - b * b))
+def _square(off: Floats, faster: Floats, tip: Tip) -> Floats:
+    """Squared Mahalanobis distances (n, h) of level positions and velocities (n, h, 2); a velocity that was not told is none."""
+    rows = np.array([0, 1, 3, 4])
+    known = tip.state.covariance[..., rows[:, None], rows]
+    has_velocity = ~np.isnan(faster[..., :1])
+    noise = np.concatenate(
+        [
+            np.broadcast_to((tip.scatter_m2 + WANDERS_M**2)[:, None, None], off.shape),
+            np.where(has_velocity, (tip.scatter_mps2 + WANDERS_MPS**2)[:, None, None], 1e6) * np.ones_like(off),
+        ],
+        axis=-1,
+    )
+    both = np.concatenate([off, np.where(has_velocity, faster, 0.0)], axis=-1)
+    scatter = known + noise[..., None] * np.eye(4)
+    return np.asarray(np.sum(both * np.linalg.solve(scatter, both[..., None])[..., 0], axis=-1))
 
 
 def _of_the_oldest(tip: Tip, walks: Bools, which: Bools) -> Reckoning:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gateway.estimators import dead_reckoning as dr
 from gateway.estimators.inertial import displaced
 from gateway.observation import Observation
-from gateway.reckon.cells import CELL_NS, GAP_NS, SECOND_CELLS, Cells, cells, covered_until, first_covered
+from gateway.reckon.cells import BLOCK, CELL_NS, GAP_NS, SECOND_CELLS, Cells, cells, covered_until, first_covered
 from gateway.reckon.judging import TRUSTED_AFTER, WANDERS_M
 from gateway.reckon.running import Kinds, begun, run
 from gateway.reckon.tip import NOTHING, Tip
@@ -253,16 +253,17 @@ def _begun_or_kept(one: Reckoner, since: int, at: int, settings: DeadReckoning) 
 def _first(told: Told, settings: DeadReckoning) -> Tip | None:
     """The first tip, at the newest position with a velocity that an attitude is near to, if the unit goes on from there."""
     places, attitudes = told.places, told.series[ATTITUDE]
-    known = np.flatnonzero(~np.isnan(places.values[:, 3])) if len(places.at) else np.empty(0, np.int64)
-    if not len(known) or not len(attitudes.at) or not len(told.inertial.at):
+    if not len(places.at) or not len(attitudes.at) or not len(told.inertial.at):
         return None
-    row = int(known[-1])
-    cell = int(places.at[row]) // CELL_NS
-    nearest = int(np.argmin(np.abs(attitudes.at - places.at[row])))
-    is_near = abs(int(attitudes.at[nearest] - places.at[row])) <= NEAR_ATTITUDE_NS
-    if not is_near or first_covered(told, cell) > cell or covered_until(told, cell) <= cell:
-        return None
-    return begun(places.values[row], attitudes.values[nearest], cell, settings)
+    since = first_covered(told, 0)
+    until = covered_until(told, since)
+    at = places.at // CELL_NS // BLOCK * BLOCK
+    usable = np.flatnonzero(~np.isnan(places.values[:, 3]) & (at >= since) & (at < until))
+    for row in usable[::-1].tolist():
+        nearest = int(np.argmin(np.abs(attitudes.at - places.at[row])))
+        if abs(int(attitudes.at[nearest] - places.at[row])) <= NEAR_ATTITUDE_NS:
+            return begun(int(places.at[row]), places.values[row], attitudes.values[nearest], settings)
+    return None
 
 
 def _pruned(one: Reckoner, oldest: int, settings: DeadReckoning) -> Reckoner:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gateway.estimators import dead_reckoning as dr
 from gateway.estimators.dead_reckoning import Reckoning, Unit
 from gateway.estimators.inertial import Motion, between, displaced
-from gateway.reckon.cells import CELL_S, SECOND_CELLS, Cells
+from gateway.reckon.cells import BLOCK, CELL_NS, CELL_S, SECOND_CELLS, Cells
 from gateway.reckon.judging import FAR, judged
 from gateway.reckon.tip import (
     HYPOTHESES,
@@ -34,7 +34,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 LASTS_S = 30.0  # the errors of an autopilot's attitude, of an airspeed and of an altitude: what is told is that old
-ATTITUDE_EVERY, OTHERS_EVERY = 10, 5  # cells
+ATTITUDE_EVERY = 10  # cells
 SLOWEST_AIR_MPS = 8.0  # below it an airspeed tells nothing
 UNSEEN_SHARE = 0.6  # of the scatter of samples, that the motion between them may have been another
 STARTING_VELOCITY_MPS = 0.5
@@ -82,11 +82,13 @@ def unit_of(settings: DeadReckoning) -> Unit:
     )
 
 
-def begun(place: Floats, attitude: Floats, cell: int, settings: DeadReckoning) -> Tip:
-    """One vehicle that dead reckoning begins with: a position as `told.PLACE`, and an attitude (4,)."""
+def begun(at: int, place: Floats, attitude: Floats, settings: DeadReckoning) -> Tip:
+    """One vehicle that dead reckoning begins with: a position as `told.PLACE` at an instant, and an attitude (4,)."""
+    cell = at // CELL_NS // BLOCK * BLOCK
     height = place[2] if math.isfinite(place[2]) else 0.0
     latitude, longitude, above = (np.array([one]) for one in (place[0], place[1], height))
     velocity = np.nan_to_num(place[3:6])[None]
+    latitude, longitude, above = displaced(latitude, longitude, above, velocity * ((cell * CELL_NS - at) / 1e9))
     upright = place[7] if math.isfinite(place[2]) else 1e4
     sigma = np.array([place[6], place[6], upright])
     speed = np.full(3, max(float(place[8]), STARTING_VELOCITY_MPS))
@@ -117,7 +119,7 @@ def run(tips: Sequence[Tip], inputs: Sequence[Cells], kinds: Kinds, settings: De
     left: list[list[Tip]] = [[] for _ in tips]
     whole, unit = joined(tips), unit_of(settings)
     ends = [one.end for one in inputs]
-    for cell in range(int(whole.cell.min()), max(ends)):
+    for cell in range(int(whole.cell.min()), max(ends), BLOCK):
         rows = np.flatnonzero([one.first <= cell < one.end for one in inputs])
         all_of_them = len(rows) == len(tips)
         some = whole if all_of_them else whole.taken(rows)
@@ -125,14 +127,14 @@ def run(tips: Sequence[Tip], inputs: Sequence[Cells], kinds: Kinds, settings: De
         after = _through(some, _Slice.of([inputs[int(row)] for row in rows], cell), mine, cell, unit, settings)
         whole = after if all_of_them else whole.put(rows, after)
         for place, row in enumerate(rows):
-            if (cell + 1) % 10 == 0 or cell + 1 == ends[row]:
+            if (cell + BLOCK) % SECOND_CELLS == 0 or cell + BLOCK == ends[row]:
                 left[row].append(after.taken(np.array([place])))
     return left
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Slice:
-    """One cell of n vehicles."""
+    """One block of n vehicles: m cells of each (n, m, ...), and what was told in them last, or first, at the block's end."""
 
     rate: Floats
     force: Floats
@@ -148,26 +150,53 @@ class _Slice:
 
     @classmethod
     def of(cls, inputs: Sequence[Cells], cell: int) -> _Slice:
-        at = [cell - one.first for one in inputs]
+        rows = [slice(cell - one.first, cell - one.first + BLOCK) for one in inputs]
 
         def column(name: str) -> NDArray[Any]:
-            return np.array([getattr(one, name)[place] for one, place in zip(inputs, at, strict=True)])
+            return np.array([getattr(one, name)[row] for one, row in zip(inputs, rows, strict=True)])
 
-        names = ("rate_radps", "force_mps2", "unseen", "is_told", "attitude", "airspeed_mps", "altitude_m")
-        return cls(*(column(name) for name in (*names, "place", "place_late_s", "pictured", "pictured_late_s")))
+        place, late = _told_first(column("place"), column("place_late_s"))
+        pictured, pictured_late = _told_first(column("pictured"), column("pictured_late_s"))
+        return cls(
+            column("rate_radps"),
+            column("force_mps2"),
+            column("unseen")[:, -1],
+            np.asarray(column("is_told").all(axis=1)),
+            column("attitude")[:, -1],
+            _told_last(column("airspeed_mps")),
+            _told_last(column("altitude_m")),
+            place,
+            late,
+            pictured,
+            pictured_late,
+        )
+
+
+def _told_last(values: Floats) -> Floats:
+    """The last of each row's values (n, m) that is a number."""
+    known = ~np.isnan(values)
+    last = values.shape[1] - 1 - np.argmax(known[:, ::-1], axis=1)
+    return np.asarray(values[np.arange(len(values)), last])
+
+
+def _told_first(values: Floats, late_s: Floats) -> tuple[Floats, Floats]:
+    """The first of each row's values (n, m, k) that is told, and how long before the block's end that was, s (n,)."""
+    rows, first = np.arange(len(values)), np.argmax(~np.isnan(late_s), axis=1)
+    return values[rows, first], late_s[rows, first] + (BLOCK - 1 - first) * CELL_S
 
 
 def _through(tip: Tip, told: _Slice, kinds: Kinds, cell: int, unit: Unit, settings: DeadReckoning) -> Tip:
-    """One cell further."""
+    """One block further."""
     before = tip.state.motion.velocity_mps[:, 0]
     unseen = UNSEEN_SHARE * told.unseen[:, None]
     wanders = np.where(told.is_told, settings.attitude_wanders, 0.0)
     more = np.hypot(unseen[..., 3:], wanders[:, None, None]), unseen[..., :3]
-    state = dr.carried_on(tip.state, told.rate[:, None], told.force[:, None], CELL_S, unit, more)
-    accelerated = (state.motion.velocity_mps[:, 0] - before) / CELL_S
-    state = _tied(state, told, kinds, cell, settings)
-    tip = replace(tip, state=state, cell=tip.cell + 1, accelerated_mps2=accelerated)
-    tip = _with_altitude(tip, told, cell, settings)
+    state = dr.carried_through(tip.state, told.rate[:, None], told.force[:, None], CELL_S, unit, more)
+    accelerated = (state.motion.velocity_mps[:, 0] - before) / (BLOCK * CELL_S)
+    end = cell + BLOCK
+    state = _tied(state, told, kinds, end, settings)
+    tip = replace(tip, state=state, cell=tip.cell + BLOCK, accelerated_mps2=accelerated)
+    tip = _with_altitude(tip, told, end, settings)
     has_place = np.flatnonzero(~np.isnan(told.place[:, 0]))
     if len(has_place):
         some = judged(tip.taken(has_place), told.place[has_place], told.place_late[has_place], settings)
@@ -175,10 +204,10 @@ def _through(tip: Tip, told: _Slice, kinds: Kinds, cell: int, unit: Unit, settin
     is_pictured = np.flatnonzero(~np.isnan(told.pictured[:, 0]))
     if len(is_pictured):
         tip = tip.put(is_pictured, _with_picture(tip.taken(is_pictured), told, is_pictured))
-    if (cell + 1) % SEEDED_EVERY == 0:
-        which = 1 + (cell + 1) // SEEDED_EVERY % (HYPOTHESES - 1)
+    if end % SEEDED_EVERY == 0:
+        which = 1 + end // SEEDED_EVERY % (HYPOTHESES - 1)
         seeded = tip.seeded.copy()
-        seeded[:, which] = cell + 1
+        seeded[:, which] = end
         tip = replace(tip, state=with_hypothesis(tip.state, which, hypothesis(tip.state, 0)), seeded=seeded)
     return tip
 
@@ -191,8 +220,6 @@ def _tied(state: Reckoning, told: _Slice, kinds: Kinds, cell: int, settings: Dea
         lasting = math.sqrt(2.0 * LASTS_S / (ATTITUDE_EVERY * CELL_S))
         sigma = settings.attitude_sigma_rad * np.array([1.0, 1.0, 2.0]) * lasting
         state = _of_some(state, rows, lambda some: dr.with_attitude(some, told.attitude[rows][:, None], sigma)[0])
-    if cell % OTHERS_EVERY:
-        return state
     rows = np.flatnonzero(kinds.wheels)
     slip = settings.slip_mps
     state = _of_some(state, rows, lambda some: dr.with_wheels(some, np.array([slip, slip]))[0])
@@ -202,7 +229,7 @@ def _tied(state: Reckoning, told: _Slice, kinds: Kinds, cell: int, settings: Dea
     if len(rows):
         height = state.motion.height_m[rows]
         fast = true_airspeed_mps(told.airspeed[rows][:, None], height)
-        sigma_mps = settings.airspeed_sigma_mps * math.sqrt(2.0 * 2.0 / (OTHERS_EVERY * CELL_S))
+        sigma_mps = settings.airspeed_sigma_mps * math.sqrt(2.0 * 2.0 / (BLOCK * CELL_S))
         state = _of_some(
             state, rows, lambda some: dr.with_airspeed(some, fast, sigma_mps, settings.sideslip_sigma_mps)[0]
         )
@@ -229,13 +256,13 @@ def _put_rows(rows: Ints) -> Callable[..., NDArray[Any]]:
 
 def _with_altitude(tip: Tip, told: _Slice, cell: int, settings: DeadReckoning) -> Tip:
     """With an altitude that is told beside positions, which while these come shows by how much it is another."""
-    rows = np.flatnonzero(~np.isnan(told.altitude)) if cell % OTHERS_EVERY == 0 else np.empty(0, np.int64)
+    rows = np.flatnonzero(~np.isnan(told.altitude))
     if not len(rows):
         return tip
     known, altitude = tip.above_m[rows], told.altitude[rows]
     off = tip.state.motion.height_m[rows, 0] - altitude
     learns = (cell - tip.heard[rows] <= 2 * SECOND_CELLS) & (tip.denied[rows] == NOTHING)
-    share = OTHERS_EVERY * CELL_S / LASTS_S
+    share = BLOCK * CELL_S / LASTS_S
     above = tip.above_m.copy()
     above[rows] = np.where(np.isnan(known), np.where(learns, off, np.nan), known + learns * share * (off - known))
     tip = replace(tip, above_m=above)
@@ -243,7 +270,7 @@ def _with_altitude(tip: Tip, told: _Slice, cell: int, settings: DeadReckoning) -
     if not len(ties):
         return tip
     mine = rows[ties]
-    sigma = settings.altitude_sigma_m * math.sqrt(2.0 * LASTS_S / (OTHERS_EVERY * CELL_S))
+    sigma = settings.altitude_sigma_m * math.sqrt(2.0 * LASTS_S / (BLOCK * CELL_S))
     height = (altitude + above[rows])[ties][:, None]
 
     def tie(state: Reckoning) -> Reckoning:

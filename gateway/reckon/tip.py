@@ -1,7 +1,7 @@
 """How far the dead reckoning of some vehicles has come: its filters, and what it thinks of their position source.
 
 Of each vehicle run several hypotheses side by side: the first one is corrected by GPS, the others were split off from it in
-turn, ten seconds apart, and go on without. What walks off too slowly for the first one is found by the others.
+turn, five seconds apart, and go on without. What walks off too slowly for the first one is found by the others.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-BRANCHES = 3
-SEEDED_EVERY = 100  # cells
+BRANCHES = 4
+SEEDED_EVERY = 50  # cells
 HYPOTHESES = 1 + BRANCHES
 NOTHING, JUMPED, WALKED_OFF = range(3)
 
