@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.estimators.kalman import ERROR, Innovation
+from gateway.estimators.kalman import ERROR, IDENTITIES, Innovation
 from gateway.estimators.matching import matched
 
 Floats = NDArray[np.float64]
@@ -39,16 +39,16 @@ def corrected(error: Floats, weight: Floats, told: Innovation, mean: Floats, cov
     """
     n, m, size = mean.shape
     gain = _whole(weight, told.gain.reshape(n, m, size, -1))
-    first = np.broadcast_to(told.sensitivity, (n * m, *told.sensitivity.shape[1:]))[::m]
-    kept = np.eye(size) - gain @ first
+    kept = IDENTITIES[size] - gain @ told.sensitivity[:: m if len(told.sensitivity) > 1 else 1]
     noise = (gain * told.noise[::m, None, :]) @ gain.transpose(0, 2, 1)
     after: Floats = kept @ error @ kept.transpose(0, 2, 1) + noise
     after = 0.5 * (after + after.transpose(0, 2, 1))
-    by_mode, axes = weight[:, None, :], np.arange(size)
+    by_mode = weight[:, None, :]
     off = mean - by_mode @ mean
-    reckoned = (by_mode @ (covariance[:, :, axes, axes] + off * off))[:, 0]
-    out = (after[:, axes, axes] > MOST * reckoned).any(axis=1)
-    if out.any():
+    reckoned = (by_mode @ (np.diagonal(covariance, axis1=2, axis2=3) + off * off))[:, 0]
+    beyond = np.diagonal(after, axis1=1, axis2=2) > MOST * reckoned
+    if beyond.any():
+        out = beyond.any(axis=1)
         _, whole = matched(weight[out, :, None], mean[out], covariance[out])
         after[out] = whole[:, 0]
     return after

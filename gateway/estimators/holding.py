@@ -24,7 +24,11 @@ Ints = NDArray[np.int64]
 WIDE = SIZE + 2
 LONG = 1.0  # time constants: beyond it the closed form keeps its digits, below it eight points integrate exactly
 
-_LEVEL = (slice(0, 2), slice(3, 5), slice(SIZE, WIDE))  # position, velocity and acceleration, east and north
+_LEVEL = np.array([0, 1, 3, 4, SIZE, SIZE + 1])  # position, velocity and acceleration, east and north
+_MOVING = _LEVEL[:4]
+_UNIT = np.eye(2)
+_ORDER = np.array([0, 0, 1, 1, 2, 2])  # which of the three each of these is
+_HELD = SIZE + np.array([0, 1] * 3)  # the acceleration that acts on it
 _POINTS, _SHARES = (0.5 * part for part in np.polynomial.legendre.leggauss(8))
 _POINTS = _POINTS + 0.5
 
@@ -45,26 +49,28 @@ def turn_along(noise: Floats, course: Floats, share: Floats, most: Floats, uneve
     stands, leaves it alike.
     """
     turned = _turned(course, share, np.maximum(most, share))
-    for place, rows in enumerate(_LEVEL[:2]):
-        for columns in _LEVEL[: place + 1]:
-            block = noise[:, uneven, rows.start, columns.start, None, None] * turned
-            noise[:, uneven, rows, columns] = noise[:, uneven, columns, rows] = block
+    for mode, way in zip(uneven.tolist(), turned.transpose(1, 0, 2, 3), strict=True):
+        of_mode = noise[:, mode]
+        of_mode[:, _MOVING[:, None], _MOVING] = _along_both(of_mode[:, 0:4:3, 0:4:3], way)
 
 
 def add_held(carry: Floats, noise: Floats, elapsed_s: Floats, course: Floats, held: Held, holds: Bools) -> None:
     """Fill in what two states more do to transition and noise (n, m, 11, 11) over times (n,): modes (m,) hold, or do not."""
-    place, speed, kept = _response(elapsed_s, held.lasts_s)
-    for axis in (0, 1):
-        carry[:, holds, axis, SIZE + axis] = place[:, None]
-        carry[:, holds, 3 + axis, SIZE + axis] = speed[:, None]
-        carry[:, holds, SIZE + axis, SIZE + axis] = kept[:, None]
+    response = np.stack(_response(elapsed_s, held.lasts_s), axis=-1)
     sigma2 = held.across_mps2**2
     turned = _turned(course, np.array([held.along_mps2 / held.across_mps2]))
-    grown = sigma2 * _grown(elapsed_s, held.lasts_s)
-    for row, rows in enumerate(_LEVEL):
-        for column, columns in enumerate(_LEVEL):
-            noise[:, holds, rows, columns] += grown[:, row, column, None, None, None] * turned
-    noise[:, ~holds, SIZE:, SIZE:] = sigma2 * turned
+    noise[..., SIZE:, SIZE:] = sigma2 * turned
+    block = _along_both(sigma2 * _grown(elapsed_s, held.lasts_s), turned[:, 0])
+    for mode in np.flatnonzero(holds).tolist():
+        carry[:, mode, _LEVEL, _HELD] = response[:, _ORDER]
+        noise[:, mode, SIZE:, SIZE:] = 0.0
+        noise[:, mode][:, _LEVEL[:, None], _LEVEL] += block
+
+
+def _along_both(parts: Floats, turned: Floats) -> Floats:
+    """Covariances (n, 2 k, 2 k) of k quantities, east and north each: parts (n, k, k) alike on both axes, times (n, 2, 2)."""
+    n, k, _ = parts.shape
+    return (parts[:, :, None, :, None] * turned[:, None, :, None, :]).reshape(n, 2 * k, 2 * k)
 
 
 def usual(course: Floats, held: Held) -> Floats:
@@ -76,7 +82,7 @@ def _turned(course: Floats, along: Floats, across: Floats | float = 1.0) -> Floa
     """Variances (n, m, 2, 2) of which sigma is a share (m,) along the course and a share (n, m) across it."""
     way = course[:, None, :, None] * course[:, None, None, :]
     square = np.asarray(across * across)[..., None, None]
-    return np.asarray(square * np.eye(2) + ((along * along)[:, None, None] - square) * way)
+    return np.asarray(square * _UNIT + ((along * along)[:, None, None] - square) * way)
 
 
 def _response(elapsed_s: Floats, lasts_s: float) -> tuple[Floats, Floats, Floats]:

@@ -46,6 +46,7 @@ class Innovation:
     inverse: Floats  # (n, m, m) of the covariance
     gain: Floats  # (n, 9, m)
     noise: Floats  # (n, m) variances of the measurement's noise, raised where it lay too far out
+    fit: Floats  # (n,) y' S^-1 y with the noise raised
 
     @property
     def log_likelihood(self) -> Floats:
@@ -153,9 +154,9 @@ def update(
     m = y.shape[1]
     s = h @ cross
     s[:, _ALONG[:m], _ALONG[:m]] += r
-    inverse = np.linalg.inv(s)
+    inverse = np.asarray(np.linalg.inv(s))
     column = y[:, :, None]
-    normalised = np.maximum((column.transpose(0, 2, 1) @ inverse @ column)[:, 0, 0], 0.0)
+    fit = normalised = _square(column, inverse)
     outlying = np.zeros(len(y), dtype=np.bool_)
     if robust is not None:
         limit = robust * robust * np.maximum(measured.sum(axis=1), 1)
@@ -163,15 +164,21 @@ def update(
         if growth is not None:
             r = r + growth
             s[:, _ALONG[:m], _ALONG[:m]] += growth
-            inverse = np.linalg.inv(s)
+            inverse = np.asarray(np.linalg.inv(s))
+            fit = _square(column, inverse)
     gain = cross @ inverse
     mean = state.mean + (gain @ column)[:, :, 0]
-    reduced = _IDENTITIES[size] - gain @ h
+    reduced = IDENTITIES[size] - gain @ h
     noise = (gain * r[:, None, :]) @ gain.transpose(0, 2, 1)
     covariance = reduced @ state.covariance @ reduced.transpose(0, 2, 1) + noise
     covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))
-    told = Innovation(y, s, measured, normalised, outlying, h, np.asarray(inverse), gain, r)
+    told = Innovation(y, s, measured, normalised, outlying, h, inverse, gain, r, fit)
     return Estimate(mean, covariance), told
+
+
+def _square(column: Floats, inverse: Floats) -> Floats:
+    """y' S^-1 y, (n,), of columns (n, m, 1), never less than 0."""
+    return np.maximum((column.transpose(0, 2, 1) @ inverse @ column)[:, 0, 0], 0.0)
 
 
 def _growth(
@@ -195,7 +202,7 @@ def _growth(
     return outlying, np.where(missing, 0.0, growth)
 
 
-_IDENTITIES = {size: np.eye(size) for size in (SIZE, SIZE + 2)}  # `holding` has two numbers more
+IDENTITIES = {size: np.eye(size) for size in (SIZE, SIZE + 2)}  # `holding` has two numbers more
 _ALONG = np.arange(SIZE)
 
 

@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 FADE = 0.88  # of the mean, over a second
 USUAL = 6.0  # of three degrees of freedom: a mean as large as this is noise's
 
+_UNIT = np.eye(3)
+
 
 def faded(
     score: Floats, information: Floats, innovation: Floats, scatter: Floats, sensitivity: Floats, elapsed_s: Floats
@@ -32,7 +34,7 @@ def faded(
 def lag(score: Floats, information: Floats, covariance: Floats) -> Floats:
     """What a lag adds to covariances (n, d, d): of rank one, and nothing where the mean is no larger than noise makes it."""
     size = np.maximum(1e-9 * np.trace(information, axis1=1, axis2=2), 1e-30)
-    lifted = information + size[:, None, None] * np.eye(3)
+    lifted = information + size[:, None, None] * _UNIT
     off = np.linalg.inv(lifted) @ score[:, :, None]
     excess = (score[:, None, :] @ off)[:, 0, 0]
     share = np.maximum(0.0, 1.0 - USUAL / np.maximum(excess, 1e-9))

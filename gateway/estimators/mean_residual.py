@@ -16,6 +16,7 @@ Floats = NDArray[np.float64]
 LEAST_RESIDUAL_M = 1e-3  # `literal` is singular at 0
 
 _AXES = np.arange(3)
+_UNIT = np.eye(3)
 
 
 def faded(score: Floats, information: Floats, told: Innovation, left: Floats) -> tuple[Floats, Floats]:
@@ -34,7 +35,7 @@ def faded(score: Floats, information: Floats, told: Innovation, left: Floats) ->
 def excess(score: Floats, information: Floats) -> Floats:
     """s' J^-1 s, (n, m): chi-square with up to three degrees for a mode that is right; what was never measured adds 0."""
     size = np.maximum(1e-9 * information[..., _AXES, _AXES].sum(axis=-1), 1e-30)
-    lifted = information + size[..., None, None] * np.eye(3)
+    lifted = information + size[..., None, None] * _UNIT
     return np.maximum((score[..., None, :] @ np.linalg.inv(lifted) @ score[..., :, None])[..., 0, 0], 0.0)
 
 

@@ -20,13 +20,26 @@ class Told:
     prior: Floats  # (n, m) the modes' weights before it
     each: Innovation  # of every mode, n m rows
     mode_log_likelihood: Floats  # (n, m)
-    error: Floats  # (n, d, d) of the mixtures before it, as `actual_error` has it
-    unmixed: Floats  # (n, m) the weights before the modes mixed
+    sensitivity: Floats  # (n, k, d) or (1, k, d) of the first mode; the modes' own hardly differ
+    innovation: Floats  # (n, k), 0 where nothing was measured
+    scatter: Floats  # (n, k, k) what innovations scatter by: by the error that the filter really makes; where not measured, 1
 
-    @property
-    def innovation(self) -> Floats:
-        """(n, k), 0 where nothing was measured."""
-        return np.asarray((self.prior[:, None, :] @ self._shaped(self.each.innovation))[:, 0])
+    @classmethod
+    def of(cls, prior: Floats, each: Innovation, mode_log_likelihood: Floats, error: Floats, unmixed: Floats) -> Told:
+        """From the errors (n, d, d) of the mixtures before it and the weights (n, m) before the modes mixed.
+
+        Modes that have not begun are no part of the scatter: they are begun far more often by the filter than by aircraft.
+        """
+        n, m = prior.shape
+        shaped = each.innovation.reshape(n, m, -1)
+        innovation = prior[:, None, :] @ shaped
+        off = shaped - innovation
+        first = each.sensitivity[:: m if len(each.sensitivity) > 1 else 1]
+        scatter = first @ error @ first.transpose(0, 2, 1)
+        along = np.arange(scatter.shape[-1])
+        scatter[:, along, along] += each.noise[::m]
+        scatter += (unmixed[:, :, None] * off).transpose(0, 2, 1) @ off
+        return cls(prior, each, mode_log_likelihood, first, innovation[:, 0], scatter)
 
     @property
     def covariance(self) -> Floats:
@@ -40,26 +53,6 @@ class Told:
         """Squared, y' S^-1 y, (n,)."""
         y = self.innovation[:, :, None]
         return np.asarray((y.transpose(0, 2, 1) @ np.linalg.inv(self.covariance) @ y)[:, 0, 0])
-
-    @property
-    def scatter(self) -> Floats:
-        """What innovations scatter by, (n, k, k): by the error that the filter really makes. Where not measured, 1.
-
-        Modes that have not begun are no part of it: they are begun far more often by the filter than by aircraft.
-        """
-        first = self.sensitivity
-        scatter = first @ self.error @ first.transpose(0, 2, 1)
-        along = np.arange(scatter.shape[-1])
-        scatter[:, along, along] += self.each.noise[:: self.prior.shape[1]]
-        off = self._shaped(self.each.innovation) - self.innovation[:, None]
-        apart = self.unmixed[:, :, None, None] * (off[..., :, None] * off[..., None, :])
-        return np.asarray(scatter + apart.sum(axis=1))
-
-    @property
-    def sensitivity(self) -> Floats:
-        """(n, k, d) of the first mode; the modes' own hardly differ."""
-        each = self.each.sensitivity
-        return np.broadcast_to(each, (self.prior.size, *each.shape[1:]))[:: self.prior.shape[1]]
 
     @property
     def outlying(self) -> Bools:

@@ -97,20 +97,25 @@ class Numbers:
     across: Floats  # (u,) m/s2
     holds: Bools
     shaken: Shaken
+    stays: Floats  # (m, m), 1 where a mode stays what it is
+    sides: Floats  # (m, 3), 1 where a mode is straight, to the left, to the right
 
     @classmethod
     def of(cls, modes: Sequence[Mode]) -> Numbers:
         """The modes' own numbers."""
         share, along = np.array([mode.share for mode in modes]), np.array([mode.along for mode in modes])
+        turn = np.array([mode.turn for mode in modes])
         uneven, shaken = np.flatnonzero(along != 1.0), Shaken.of([mode.motion for mode in modes])
         return cls(
-            np.array([mode.turn for mode in modes]),
+            turn,
             share / share.sum(),
             uneven,
             along[uneven],
             np.sqrt(shaken.level[uneven]),
             np.array([mode.holds for mode in modes]),
             shaken,
+            np.eye(len(modes)),
+            (np.sign(turn)[:, None] == [0.0, 1.0, -1.0]).astype(np.float64),
         )
 
 
@@ -145,8 +150,7 @@ class Modes:
 
     def directions(self, weight: Floats) -> Floats:
         """Probabilities (n, 3) of flying straight, turning left, turning right, from the modes' weights (n, m)."""
-        sides = np.sign(self.numbers.turn)
-        return np.stack([(weight * (sides == side)).sum(axis=1) for side in (0.0, 1.0, -1.0)], axis=1)
+        return np.asarray((weight[:, None, :] @ self.numbers.sides)[:, 0])
 
     def transition(self, elapsed_s: Floats) -> Floats:
         """Probabilities (n, m, m) of being in mode j after times (n,), having been in mode i.
@@ -155,7 +159,7 @@ class Modes:
         Source: 000 2.1.2, p_ij. Deviation: of the time since the last update, never of a fixed period.
         """
         keep = np.exp(elapsed_s / -self.lasts_s)[:, None, None]
-        return np.asarray(keep * np.eye(self.count) + (1.0 - keep) * self.shares)
+        return np.asarray(keep * self.numbers.stays + (1.0 - keep) * self.shares)
 
     @property
     def shares(self) -> Floats:
@@ -220,11 +224,12 @@ def moved(mean: Floats, weight: Floats, elapsed_s: Floats, modes: Modes) -> tupl
     rate = modes.turn_rate(speed)
     numbers, held = modes.numbers, modes.acceleration
     carry, noise = carried(numbers.shaken, elapsed_s, rate, SIZE if held is None else WIDE)
+    course = _course(level)
     if len(numbers.uneven):
         slow = np.minimum(speed[:, None] * modes.turn_rate_rps / numbers.across, 1.0)
-        turn_along(noise, _course(level), numbers.along, slow, numbers.uneven)
+        turn_along(noise, course, numbers.along, slow, numbers.uneven)
     if held is not None:
-        add_held(carry, noise, elapsed_s, _course(level), held, numbers.holds)
+        add_held(carry, noise, elapsed_s, course, held, numbers.holds)
     return carry, noise
 
 
@@ -254,11 +259,9 @@ def weigh(mixture: Mixture, after: Estimate, told: Innovation, modes: Modes) -> 
     Source: 000 2.1.2 eq 10 to 12.
     """
     n, m = mixture.weight.shape
-    column = told.innovation[:, :, None]
-    fit = (column.transpose(0, 2, 1) @ told.inverse @ column)[:, 0, 0]
     _, log_determinant = np.linalg.slogdet(told.covariance)
     degrees = told.measured.sum(axis=1)
-    likelihood = (-0.5 * (fit + log_determinant + degrees * math.log(2.0 * math.pi))).reshape(n, m)
+    likelihood = (-0.5 * (told.fit + log_determinant + degrees * math.log(2.0 * math.pi))).reshape(n, m)
     score, information, recent = mixture.score, mixture.information, mixture.recent
     log = np.log(mixture.weight) + likelihood
     if modes.rule == "rmimm":
@@ -272,7 +275,7 @@ def weigh(mixture: Mixture, after: Estimate, told: Innovation, modes: Modes) -> 
     weight = np.maximum(weight / weight.sum(axis=1, keepdims=True), LEAST_WEIGHT)
     weight /= weight.sum(axis=1, keepdims=True)
     mean, covariance = after.mean.reshape(n, m, -1), after.covariance.reshape(mixture.covariance.shape)
-    whole = Told(mixture.weight, told, likelihood, mixture.error, mixture.unmixed)
+    whole = Told.of(mixture.weight, told, likelihood, mixture.error, mixture.unmixed)
     whole_score, whole_information = lagging.faded(
         mixture.whole_score,
         mixture.whole_information,

@@ -56,7 +56,8 @@ def test_what_is_held_moves_as_its_differential_equation_says(elapsed_s: float, 
     part, grown = both[WIDE:, WIDE:].T, both[WIDE:, WIDE:].T @ both[:WIDE, WIDE:]
     for _ in range(8):
         wanted, shaken = part @ wanted, part @ shaken @ part.T + grown
-    np.testing.assert_allclose(carry[1], wanted, rtol=1e-8, atol=1e-8)
+    # The reference is a product of eight exponentials: where nothing stands it has what rounding leaves of its largest entry.
+    np.testing.assert_allclose(carry[1], wanted, rtol=1e-8, atol=1e-8 + 1e-11 * wanted.max())
     scale = np.sqrt(np.outer(shaken.diagonal(), shaken.diagonal()))
     np.testing.assert_allclose(noise[1] / scale, shaken / scale, rtol=1e-7, atol=1e-7)
 
