@@ -85,8 +85,8 @@ class _Hearing:
         self.gathered.close()
 
     def _state(self) -> _State:
-        """What the reading of frames that wait depends on, beside their senders' clocks; and whether none may wait, or be gathered:
-        at another speed a second of stamps is not one of the session, and dead reckoning goes by those.
+        """What the reading of frames that wait depends on, beside their senders' clocks; and whether none may wait, or be
+        gathered: at another speed a second of stamps is not one of the session, and dead reckoning goes by those.
         """
         by = self._by
         none_may = by.epoch.offset_s is None or by.epoch.speed != 1.0 or by.plans.waits

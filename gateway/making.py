@@ -155,5 +155,6 @@ class Making:
             truth=tuple(observation for observation in observations if isinstance(observation, Truth)),
             health=replace(health, sources=(*health.sources, own)),
             events=tuple(self.events),
+            reckoned=tuple(self.reckoned),
         )
         return state, picture

@@ -9,6 +9,7 @@ from gateway.associate import Associated
 from gateway.fuse import Fused
 from gateway.observation import Observation, Truth
 from gateway.predict import Predicted
+from gateway.reckon import Reckoned
 from gateway.register import Registered
 from gateway.track import Tracked
 
@@ -61,6 +62,19 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
+class MutedError:
+    """How far something was from a position that is muted, level, and by its own word (1 sigma an axis; NaN = none)."""
+
+    aircraft: str
+    at: int
+    since_s: float  # since the first position that is missing
+    what: str  # "track", "dead reckoning", "constant velocity"
+    error_m: float
+    sigma_m: float
+    is_inside: bool  # both axes within three sigma
+
+
+@dataclass(frozen=True, slots=True)
 class Picture:
     """One step's results, in the order of the data path, and what went in.
 
@@ -79,3 +93,5 @@ class Picture:
     truth: tuple[Truth, ...]
     health: Health
     events: tuple[Event, ...]
+    reckoned: tuple[Reckoned, ...] = ()  # where dead reckoning had vehicles at the whole seconds of the step
+    muted: tuple[MutedError, ...] = ()

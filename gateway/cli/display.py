@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Self
 
 from rich.console import Console
@@ -15,6 +15,7 @@ from gateway.cli.viewing import Viewing
 
 if TYPE_CHECKING:
     from gateway.picture import Picture
+    from gateway.runtime.muted import MutedScore
     from gateway.runtime.run import Run
     from gateway.runtime.summary import SmoothedSummary, Summary
 
@@ -114,10 +115,27 @@ def show_summary(summary: Summary, console: Console) -> None:
             numbers = (f"{score.rmse_m:.2f}", f"{score.median_m:.2f}", f"{score.p95_m:.2f}", str(score.count))
             scores.add_row(_WORDS.get(kind, kind), *numbers)
         console.print(scores)
+    if summary.muted:
+        _show_muted(summary.muted, console)
     if summary.smoothed is not None and summary.smoothed.accuracy:
         _show_smoothed(summary.smoothed, console)
     if summary.archive is not None:
         console.print(f"archived in {summary.archive}", soft_wrap=True)
+
+
+def _show_muted(scores: Sequence[MutedScore], console: Console) -> None:
+    """How far what went on without positions was from those that were muted."""
+    marks = sorted({mark for score in scores for mark in score.by_mark_m})
+    title = "level distance to the muted GPS, m"
+    table = Table(box=None, padding=(0, 2, 0, 0), title=title, title_justify="left")
+    for column in ("", "", "for", "median", *(f"at {mark} s" for mark in marks), "end", "largest", "in 3 σ"):
+        table.add_column(column, justify="left" if not column else "right", no_wrap=True)
+    for score in scores:
+        by_mark = (f"{score.by_mark_m[mark]:.1f}" if mark in score.by_mark_m else "" for mark in marks)
+        inside = "" if score.inside is None else f"{100.0 * score.inside:.0f} %"
+        ends = f"{score.at_end_m:.1f}", f"{score.largest_m:.1f}", inside
+        table.add_row(score.aircraft, score.what, f"{score.lasts_s:.0f} s", f"{score.median_m:.1f}", *by_mark, *ends)
+    console.print(table)
 
 
 def _show_smoothed(found: SmoothedSummary, console: Console) -> None:

@@ -215,6 +215,8 @@ class Run:
         assert self.outputs is not None
         health = self._decoder.health(self._watermark)
         self._state, picture = step(self._state, heard, health)
+        if self.setup.options.mutes:
+            picture = self._muting.muted.add(picture)
         self._tally.add(picture)
         try:
             if self._recorder is not None:
@@ -312,6 +314,7 @@ class Run:
             associations_lost=tally.changes["lost"] if tally else 0,
             counters=self._counters(),
             accuracy=tally.accuracy.scores() if tally else {},
+            muted=self._muting.muted.scores(),
             smoothed=self.outputs.smoothed() if self.outputs else None,
             archive=self.folder,
         )

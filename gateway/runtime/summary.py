@@ -10,6 +10,7 @@ from typing import Any
 from gateway.observation import Many, how_many
 from gateway.picture import Picture, SourceHealth
 from gateway.runtime.accuracy import Accuracy, Score, SmoothedScore
+from gateway.runtime.muted import MutedScore
 from gateway.settings import Runway
 
 _NAMED_AT_MOST = 10_000
@@ -56,6 +57,7 @@ class Summary:
     associations_lost: int
     counters: dict[str, int]
     accuracy: dict[str, Score] = field(default_factory=dict)
+    muted: tuple[MutedScore, ...] = ()  # of what went on without the positions that were muted
     smoothed: SmoothedSummary | None = None  # None: nobody asked for it
     archive: Path | None = None
 
