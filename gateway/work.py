@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from enum import IntEnum
 
 from gateway import associate, fuse, predict, track
 from gateway.align import SECOND, Fix
@@ -18,10 +19,24 @@ from gateway.register import WAIT_NS, gathered, remaining, residuals
 from gateway.track import RadarTracks
 from gateway.tracking import Tracked
 
-EIGHTH = SECOND // 8
-FORGETS, REGISTERS, JUDGES, PROBES, COMPARES, JOINS = 2, 3, 4, 5, 6, 7  # in which eighth of a second what is done
-IDLE = (FORGETS, JUDGES, PROBES, COMPARES, JOINS)  # at a whole second, where there is nothing: they find nothing to do
 PLOT_MARGIN_S = 4.0  # plots are remembered this much longer than reports: a report's check looks back over them
+
+
+class Turn(IntEnum):
+    """What is done once a second, in which sixteenth of it; at tenths parts of a crowd are predicted."""
+
+    FORGETTING = 1
+    FORGETTING_MORE = 3
+    REGISTERING = 5
+    JUDGING = 8
+    LOOKING = 9
+    PROBING = 11
+    COMPARING = 13
+    JOINING = 15
+
+
+TURN_NS = SECOND // 16
+READING_LANES = frozenset(Turn) - {Turn.REGISTERING, Turn.COMPARING}
 
 
 class Work(Reckoning):
@@ -35,7 +50,7 @@ class Work(Reckoning):
         """The instants before an arrival at which register or predict have their turn, with a watermark also at its very one.
 
         What else happens by itself is done on the way: checks that are due before them, at each whole second ends and coasting,
-        and at the eighths between them one thing after the other. While there is nothing, seconds are passed over, however many
+        and between them, in turn, one thing after the other. While there is nothing, seconds are passed over, however many
         a step brings: nothing may happen then that would be otherwise for more of them.
         """
         now, watermark = arrival.now, not arrival.observations
@@ -57,29 +72,32 @@ class Work(Reckoning):
                     self._live_until(at)
                     yield at
                 is_idle = is_whole and not self.lanes.lanes and self.association.due is None
-                for turn in IDLE if is_idle else (at % SECOND // EIGHTH,):
+                for turn in Turn if is_idle else (at % SECOND // TURN_NS,):
                     self._in_turn(turn, at)
-                if at % SECOND == REGISTERS * EIGHTH:
+                if at % SECOND == Turn.REGISTERING * TURN_NS:
                     yield at
-                self.instant = max((now - 1) // SECOND * SECOND, at) + SECOND if is_idle else at + EIGHTH
+                self.instant = max((now - 1) // SECOND * SECOND, at) + SECOND if is_idle else at + TURN_NS
             due = self._next_check()
         self.now = max(now, self.now or now)
         self.events += [Event(now, level, text) for level, text in arrival.notes]
 
-    def _in_turn(self, eighth: int, at: int) -> None:
+    def _in_turn(self, turn: int, at: int) -> None:
         """What is done once a second between the whole seconds: of a crowd it would hold up for long what comes, all at once."""
-        if eighth in (FORGETS, JUDGES, PROBES, JOINS):
+        if turn in READING_LANES:
             self._settle()
-        if eighth == FORGETS:
+        if turn == Turn.FORGETTING:
             self._forget(at)
-        elif eighth == JUDGES:
+        elif turn == Turn.FORGETTING_MORE:
+            self._forget_more(at)
+        elif turn == Turn.JUDGING:
             self.consistency = self.consistency.planning(at)
-            self._judge(at)
-        elif eighth == PROBES:
+        elif turn == Turn.LOOKING:
+            self.probing = self.probing.looking(at, list(self._confirmed()), self.site.separation)
+        elif turn == Turn.PROBING:
             self._probe(at)
-        elif eighth == COMPARES:
+        elif turn == Turn.COMPARING:
             self._compare_radars(at)
-        elif eighth == JOINS:
+        elif turn == Turn.JOINING:
             self._join_radars(at)
 
     def _judge(self, at: int) -> None:
@@ -100,7 +118,7 @@ class Work(Reckoning):
         self.events += [Event(at, "info", text) for one in lived if (text := fuse.sentence(one, lanes)) is not None]
         self.lanes = lanes
         silent = [lane for lane in self._alive() if lane.last.at < at and lane.coasting_at(at, self.options)]
-        self.rows += fuse.coast(silent, at, self._spans, self.geoid.separation_m, self.model)
+        self.rows += self._with_wind(fuse.coast(silent, at, self._spans, self.geoid.separation_m, self.model))
 
     def _alive(self) -> list[Lane]:
         return [lane for lane in self.lanes.lanes.values() if lane.ended_at is None and lane.events]
@@ -111,6 +129,10 @@ class Work(Reckoning):
         was, self.lanes = self.lanes, self.lanes.pruned(before)
         self.settled += fuse.settled(was, self.lanes)
         self.predicting = self.predicting.forgotten(self.lanes.lanes, self.lanes.by_aircraft, at)
+
+    def _forget_more(self, at: int) -> None:
+        """What is older than the history of radar tracks and of what was found of them."""
+        before = at - self.history
         self.tracks = self.tracks.pruned(before - int(PLOT_MARGIN_S * SECOND))
         self.unnumbered = self.unnumbered.pruned(before)
         self.lanes = fuse.remembered(self.lanes, self.tracks, self._spans)
@@ -242,7 +264,7 @@ class Work(Reckoning):
     def register(self, at: int) -> None:
         """What pairs that leave the history tell of the radars' errors; a step further in what align takes off."""
         use = self.options.registration
-        if use == "off" or at % SECOND != REGISTERS * EIGHTH:
+        if use == "off" or at % SECOND != Turn.REGISTERING * TURN_NS:
             return
         until, known = at - self.history - WAIT_NS, self.registration.learnt_until
         spans = self.association.ledger.spans
@@ -285,18 +307,20 @@ class Work(Reckoning):
             self.events += [Event(at, level, text) for level, text in made.judged.said]
         self.probing = self.probing.hearing(made.ways, at, self.options.prediction_period_s)
 
+    def _confirmed(self) -> dict[int, Lane]:
+        """The tracks that are surely something that flies, by their numbers."""
+        return {lane.number: lane for lane in self._alive() if lane.last.score == fuse.CONFIRMED}
+
     def _probe(self, at: int) -> None:
-        """Which tracks will lose their separation: of those that are surely something that flies."""
-        alive = {lane.number: lane for lane in self._alive() if lane.last.score == fuse.CONFIRMED}
+        """Which tracks will lose their separation."""
+        alive = self._confirmed()
         if len(alive) < 2 and not self.probing.watched:
             return
-        self.probing, found = self.probing.probed(at, list(alive), self.site.separation)
+        self.probing, found = self.probing.watching(at, list(alive), self.site.separation)
         self.rounds.append(found)
         for row, state in enumerate(found.state):
             if state != "goes on":
-                names = {
-                    number: f"track {number}" + (f" ({lane.aircraft})" if lane.aircraft else "")
-                    for number, lane in alive.items()
-                }
+                pair = [alive[number] for number in found.told.pair[row].tolist() if number in alive]
+                names = {lane.number: f"track {lane.number} ({lane.aircraft})" for lane in pair if lane.aircraft}
                 level = "warning" if state == "found" else "info"
                 self.events.append(Event(at, level, predict.sentence(found, row, names, self.frame)))

@@ -32,6 +32,7 @@ LASTING = 0.3  # a receiver whose reports scatter by less than this share of wha
 TOGETHER_AT_LEAST, TOGETHER_ENOUGH = 3, 4.0 * ENOUGH  # aircraft, and squares of theirs, which are many soon
 MANY, WAIT_NS = 64, 5 * SECOND  # measurements that are judged at once, or all that came in so long
 SHARE, TRACKS_AT_LEAST = 200, 8  # of more measurements, of so many tracks or more each, each share has its own instant
+AFTER_NS = SECOND // 32  # not when others have their turns
 NOTHING_DUE = 1 << 62
 KEPT_PLOTS, KEPT_REPORTS = 6, 3  # of each track and source, to hold the next ones against
 KEPT_NS = 30 * SECOND
@@ -94,14 +95,14 @@ class Consistency:
         return self.planned[0][0] if self.planned else NOTHING_DUE
 
     def planning(self, at: int) -> Consistency:
-        """Once a second, the same with what waits to be judged: a share from this instant on, the others within the second.
+        """Once a second, the same with what waits to be judged: a share soon after this instant, the others within a second.
 
         A few measurements wait for others: many cost hardly more. Sources that were not heard for long are forgotten.
         """
         if len(self.waiting) < MANY and at // SECOND * SECOND % WAIT_NS:
             return self
         shares = _shares(self.waiting)
-        planned = tuple((at + place * SECOND // len(shares), share) for place, share in enumerate(shares))
+        planned = tuple((at + AFTER_NS + place * SECOND // len(shares), share) for place, share in enumerate(shares))
         reports, plots = (
             None if rows is None else rows.in_order().latest(count, at - KEPT_NS)
             for rows, count in ((self.reports, KEPT_REPORTS), (self.plots, KEPT_PLOTS))

@@ -22,6 +22,8 @@ LESS_PROBABLE = 0.5  # of the probability that is told: what is still as probabl
 
 Pair = tuple[int, int]
 """The numbers of two tracks, the smaller first."""
+Met = tuple[Encounters, int]
+"""One of some encounters, by its row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,26 +70,36 @@ class Round:
 
 @dataclass(frozen=True, slots=True)
 class Probing:
-    """What is remembered from round to round: the newest ways of all tracks, and the pairs that are watched."""
+    """What is remembered from round to round: the newest ways of all tracks, and the pairs that are watched.
+
+    A round is two things, so that a crowd holds nothing up for long: looking who comes near whom, and watching these.
+    """
 
     ways: tuple[Ways, ...] = ()
     watched: Mapping[Pair, Watched] = field(default_factory=dict)
-    last: Mapping[Pair, Encounters] = field(default_factory=dict)  # of those that are told, as they were told last
+    last: Mapping[Pair, Met] = field(default_factory=dict)  # of those that are told, as they were told last
+    met: Encounters | None = None  # of the round that is under way
 
     def hearing(self, ways: Ways, at: int, period_s: float) -> Probing:
         """The same with ways that were made at an instant; each track has new ones once in a period."""
         oldest = at - int(2.0 * period_s * SECOND)
         return replace(self, ways=(*(one for one in self.ways if int(one.made.max(initial=0)) >= oldest), ways))
 
-    def probed(self, at: int, alive: Sequence[int], separation: Separation) -> tuple[Probing, Round]:
-        """One round at an instant, of the tracks with these numbers; what is remembered after it."""
-        met = self._met(at, alive, separation)
+    def looking(self, at: int, alive: Sequence[int], separation: Separation) -> Probing:
+        """The same with who comes near whom, of the tracks with these numbers, as it is foretold at an instant."""
+        if not alive:
+            return replace(self, ways=(), met=None)
+        return replace(self, met=self._met(at, alive, separation))
+
+    def watching(self, at: int, alive: Sequence[int], separation: Separation) -> tuple[Probing, Round]:
+        """The round told at an instant, of the tracks with these numbers; what is remembered after it."""
+        met = Encounters.joined([]) if self.met is None else self.met
         near = {(first, second): row for row, (first, second) in enumerate(map(tuple, met.pair.tolist()))}
         conflict = (met.ratio < 1.0) & (met.probability >= separation.least_probability)
         still = conflict | (met.probability >= LESS_PROBABLE * separation.least_probability)
         watched: dict[Pair, Watched] = {}
-        told: list[tuple[Encounters, str]] = []
-        last: dict[Pair, Encounters] = {}
+        told: list[tuple[Met, str]] = []
+        last: dict[Pair, Met] = {}
         here = set(alive)
         for pair in sorted({*near, *self.watched}):
             row = near.get(pair)
@@ -100,10 +112,10 @@ class Probing:
                 continue
             watched[pair] = now
             if now.since is not None:
-                last[pair] = self.last[pair] if row is None else met.where(np.array([row]))
+                last[pair] = self.last[pair] if row is None else (met, row)
                 told.append((last[pair], "found" if before.since is None else "goes on"))
-        return replace(self, watched=watched, last=last), Round(
-            at, Encounters.joined([one for one, _ in told]), tuple(state for _, state in told)
+        return replace(self, watched=watched, last=last, met=None), Round(
+            at, _of([one for one, _ in told]), tuple(state for _, state in told)
         )
 
     def _met(self, at: int, alive: Sequence[int], separation: Separation) -> Encounters:
@@ -111,6 +123,15 @@ class Probing:
             return Encounters.joined([])
         newest = Ways.joined(self.ways)
         return encounters(newest.taken(np.isin(newest.track, np.array(alive, dtype=np.int64))), at, separation)
+
+
+def _of(some: Sequence[Met]) -> Encounters:
+    """Some encounters, one behind the other."""
+    first: dict[Encounters, int] = {}
+    for whole, _ in some:
+        first.setdefault(whole, sum(len(one.ratio) for one in first))
+    rows = np.array([first[whole] + row for whole, row in some], dtype=np.int64)
+    return Encounters.joined(list(first)).where(rows)
 
 
 def _watched(before: Watched, at: int, conflict: bool, still: bool) -> Watched | None:

@@ -237,14 +237,14 @@ def test_many_are_judged_in_shares_within_the_second(world: Any, monkeypatch: py
         monkeypatch.setattr(consistency, "SHARE", share)
         known = Consistency().hearing(told).planning(at)
         instants, shares = zip(*known.planned, strict=True)
-        assert list(instants) == [at + place * SECOND // len(shares) for place in range(len(shares))]
+        assert list(instants) == [at + consistency.AFTER_NS + k * SECOND // len(shares) for k in range(len(shares))]
         assert sorted((track, event.at) for some in shares for track, event in some) == sorted(
             (track, event.at) for track, event in told
         )
         assert len({track for some in shares for track in {track for track, _ in some}}) == len(tracks)
         assert sum(len({track for track, _ in some}) for some in shares) == len(tracks)
-        assert known.judged(PositionSource(), {}, at - 1)[0].due == at
-        ends.append((len(shares), known.judged(PositionSource(), {}, at + SECOND)[0]))
+        assert known.judged(PositionSource(), {}, instants[0] - 1)[0].due == instants[0]
+        ends.append((len(shares), known.judged(PositionSource(), {}, instants[-1])[0]))
     assert [count for count, _ in ends] == [3, 1]
     (_, parted), (_, whole) = ends
     own = [key for key in whole.noises if key[0] != "GPS"]
