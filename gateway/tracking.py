@@ -17,10 +17,10 @@ class Tracking(Arriving):
     """A step whose plots belong to radar tracks."""
 
     def track(self, plots: Sequence[Plot]) -> Tracked:
-        """The plots that the radar numbered, each with its radar track; those without a number, or with a bad one, wait."""
+        """The plots that the radar numbered, each with its radar track; those without a number wait."""
         tracked, unnumbered = [], []
         for plot in plots:
-            if plot.number == 0 or self.radars[plot.radar].numbers == "ignored":
+            if plot.number == 0:
                 unnumbered.append(plot)
             elif not self.tracks.has_room(plot):
                 self.untracked += 1

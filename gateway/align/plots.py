@@ -31,7 +31,7 @@ class Plot:
 
 
 def place_plot(plot: RadarPlot, serial: int, radar: RadarSite, correction: Correction) -> Plot:
-    """A plot with its radar's errors taken off, and the site's sigmas where it gives none."""
+    """A plot with its radar's errors taken off, the site's sigmas where it gives none, and no number that is to be ignored."""
     measured = (plot.range_m, plot.azimuth_rad, plot.elevation_rad)
     *errors, late_s = correction
     distance, azimuth, elevation = (
@@ -44,7 +44,8 @@ def place_plot(plot: RadarPlot, serial: int, radar: RadarSite, correction: Corre
     )
     polar = (distance, azimuth, elevation)
     at = plot.valid_at - round(late_s * SECOND)
-    return Plot(at, serial, plot.received_at, plot.radar, plot.track_number, polar, sigma, correction)
+    number = 0 if radar.numbers == "ignored" else plot.track_number
+    return Plot(at, serial, plot.received_at, plot.radar, number, polar, sigma, correction)
 
 
 def radar_from_status(status: RadarStatus, frame: RunwayFrame) -> RadarSite:

@@ -26,6 +26,7 @@ from gateway.sinks.scene.later import Later
 from gateway.sinks.scene.paths import ApproachScene, PredictScene
 from gateway.sinks.scene.plans import PlanScene
 from gateway.sinks.scene.radars import MultiRadarScene
+from gateway.sinks.scene.reckoning import ReckoningScene
 from gateway.sinks.scene.register import RegisterScene
 from gateway.sinks.scene.scope import ScopeScene
 from gateway.sinks.scene.site import SiteScene
@@ -79,8 +80,8 @@ class RerunSink:
         self._approach, self._predict, self._stages = ApproachScene(site), PredictScene(site), StageScene(site)
         self._scope, self._health, self._plans = ScopeScene(site), HealthScene(), PlanScene(site)
         self._smoothed, self._register, self._radars = SmoothedScene(site), RegisterScene(site), MultiRadarScene(site)
-        self._clutter, self._conflicts = ClutterScene(), ConflictScene(site)
-        self._believed = BelievedScene(site)
+        self._clutter, self._conflicts = ClutterScene(site), ConflictScene(site)
+        self._believed, self._reckoning = BelievedScene(site), ReckoningScene()
         self._period_ns, self._rows_limit = round(period_s * 1e9), rows_limit
         self._rest_ns = self._period_ns
         self._waiting: list[Picture] = []
@@ -164,6 +165,7 @@ class RerunSink:
             *self._predict.entries(pictures, flights),
             *self._conflicts.entries(pictures),
             *self._believed.entries(pictures),
+            *self._reckoning.entries(pictures),
             *self._stages.entries(pictures, flights, self._flights.newest),
             *self._register.entries(pictures),
             *self._health.entries(pictures),

@@ -9,8 +9,10 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from gateway.picture import Picture
+from gateway.settings import Site
 from gateway.sinks.scene import style
 from gateway.sinks.scene.entry import Always, Entry, entity, once, rows
+from gateway.sinks.scene.scope import Scope, raw_at
 from gateway.track import Look
 
 Floats = NDArray[np.float64]
@@ -23,7 +25,8 @@ FAINTEST, STRONGEST = 24.0, 200.0  # of 255: a hypothesis of likelihood 0, and o
 class ClutterScene:
     """Draws what is thought of unnumbered plots; remembers which radars are drawn, and when each was last."""
 
-    def __init__(self) -> None:
+    def __init__(self, site: Site) -> None:
+        self._scope = Scope(site)
         self._known: set[int] = set()
         self._drawn: dict[int, int] = {}
 
@@ -40,8 +43,17 @@ class ClutterScene:
                 self._known.add(radar)
                 found += self._looks(radar)
             found += _drawn(radar, some)
+            found.append(self._on_scope(radar, some))
             self._drawn[radar] = some[-1][0].at
         return [*found, *self._silent(pictures[-1])] if pictures else found
+
+    def _on_scope(self, radar: int, looks: Sequence[tuple[Look, int]]) -> Entry:
+        """The plots that tracks took, on the controller's screen: its own are dim, whatever they are of."""
+        time, step = [look.at for look, _ in looks], [number for _, number in looks]
+        spots = [self._scope.both(look.taken_m).reshape(-1, 2) for look, _ in looks]
+        shown = [one[np.isfinite(one).all(axis=1)] for one in spots]
+        dots = rr.Points2D.columns(positions=np.concatenate(shown)).partition(_lengths(shown))
+        return rows(_scope_path(radar), time, step, dots)
 
     def _silent(self, picture: Picture) -> list[Entry]:
         """Of a radar that has fallen silent nothing is left in the scene."""
@@ -50,7 +62,8 @@ class ClutterScene:
         for radar in silent:
             del self._drawn[radar]
             clear = rr.Clear.columns(is_recursive=[False])
-            found += [once(_path(radar, what), picture.now, picture.step, clear) for what in DRAWN]
+            paths = [*(_path(radar, what) for what in DRAWN), _scope_path(radar)]
+            found += [once(path, picture.now, picture.step, clear) for path in paths]
         return found
 
     def _looks(self, radar: int) -> list[Entry]:
@@ -61,11 +74,18 @@ class ClutterScene:
             Always(_path(radar, "hypotheses"), (rr.Points3D.from_fields(radii=style.points(2.5)),)),
             Always(_path(radar, "confirmed"), (told,)),
             Always(_path(radar, "taken"), (rr.Points3D.from_fields(colors=colour, radii=style.points(3.0)),)),
+            Always(
+                _scope_path(radar), (rr.Points2D.from_fields(colors=colour, radii=style.points(1.0), draw_order=30.0),)
+            ),
         ]
 
 
 def _path(radar: int, what: str) -> str:
     return entity("track", radar, what)
+
+
+def _scope_path(radar: int) -> str:
+    return raw_at(f"{radar}/taken")
 
 
 def _drawn(radar: int, looks: Sequence[tuple[Look, int]]) -> list[Entry]:

@@ -22,14 +22,14 @@ from gateway.sinks.scene.flown import Flock, Flown
 from gateway.sinks.scene.lately import Lately
 from gateway.sinks.scene.sheaf import Sheaf
 from gateway.sinks.scene.site import approach_reach_m
-from gateway.sinks.scene.sources import Positions, raw_path
+from gateway.sinks.scene.sources import UNNUMBERED, Positions, raw_path
 
 Floats = NDArray[np.float64]
 Key = TypeVar("Key")
 
 STRETCH = 10.0
 ROOT = "/approach/scope"
-_ABOVE = {style.FUSED: 31.0, style.SMOOTHED: 32.0}
+_ABOVE = {style.UNNUMBERED: 29.0, style.FUSED: 31.0, style.SMOOTHED: 32.0}
 
 
 class Scope:
@@ -80,7 +80,7 @@ class ScopeScene:
         entries: list[Entry] = []
         for one in heard:
             colour, size = (style.RADAR, 1.0) if one.is_plot else (style.GPS, 2.0)
-            entries += self._dots(_raw_at, colour, size, one.sheaf, one.runway_m, one.has_height)
+            entries += self._dots(raw_at, colour, size, one.sheaf, one.runway_m, one.has_height)
         all_of = flights.columns
         entries += self._dots(_fused_at, style.FUSED, 1.2, flights.sheaf, all_of.runway_m, all_of.has_height)
         return entries
@@ -109,8 +109,9 @@ class ScopeScene:
         entries: list[Entry] = []
         for key, _, end in seen.cuts():
             if self._looked.is_new(path_of(key), int(seen.time[end - 1])):
-                above = _ABOVE.get(colour, 30.0)
-                look = rr.Points2D.from_fields(colors=colour, radii=style.points(size), draw_order=above)
+                shade = style.UNNUMBERED if str(key).endswith(UNNUMBERED) else colour
+                above = _ABOVE.get(shade, 30.0)
+                look = rr.Points2D.from_fields(colors=shade, radii=style.points(size), draw_order=above)
                 entries.append(Always(path_of(key), (look,)))
         return [*entries, *seen.rows(path_of, columns.points_2d(spots[shown], shown[known].sum(axis=1)))]
 
@@ -170,7 +171,8 @@ class ScopeScene:
         return texts, np.array(places).reshape(-1, 2)
 
 
-def _raw_at(source: str) -> str:
+def raw_at(source: str) -> str:
+    """The entity of an aircraft's own positions, or of a radar track "1/3", on the screen."""
     return ROOT + raw_path(source).removeprefix("/raw")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import rerun as rr
@@ -22,6 +23,10 @@ from gateway.sinks.scene.trail import Kind, Trail, grown
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+
+
+UNNUMBERED = "/0"  # how the plots are named that their radar does not number
+AFTERGLOW_NS = 5_000_000_000  # they are of different things, so that a long trail of them tells nothing
 
 
 def raw_path(source: str) -> str:
@@ -108,8 +113,9 @@ class SourceScene:
         for name, start, end in sheaf.cuts():
             path, mine = path_of(name), slice(start, end)
             if self._drawn.is_new(path, int(sheaf.time[end - 1])):
-                shade = style.UNNUMBERED if name.endswith("/0") else colour
-                self._trails[path] = Trail(path, kind, shade, 1.0 if line else 0.8)
+                shade = style.UNNUMBERED if name.endswith(UNNUMBERED) else colour
+                lasting = partial(Trail, segments=3, segment_ns=AFTERGLOW_NS) if shade is not colour else Trail
+                self._trails[path] = lasting(path, kind, shade, 1.0 if line else 0.8)
                 look = rr.Points3D.from_fields(colors=shade, radii=style.points(2.0 if line else 3.5))
                 ground = rr.GeoPoints.from_fields(colors=shade, radii=style.points(2.0 if line else 3.0))
                 entries.append(Always(path, (look, ground)))

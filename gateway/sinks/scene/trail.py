@@ -47,8 +47,17 @@ class Grown:
 class Trail:
     """One trail: `kind` "line" for smooth tracks (a point a second), "points" for noisy ones (every position)."""
 
-    def __init__(self, path: str, kind: Kind, colour: style.Colour, size: float) -> None:
-        self._path, self._kind = path, kind
+    def __init__(
+        self,
+        path: str,
+        kind: Kind,
+        colour: style.Colour,
+        size: float,
+        *,
+        segments: int = SEGMENTS,
+        segment_ns: int = SEGMENT_NS,
+    ) -> None:
+        self._path, self._kind, self._segments, self._segment_ns = path, kind, segments, segment_ns
         self._colour, self._radius = colour, style.points(size)
         self._ground = style.points(0.4 * size if kind == "points" else size)  # a map is small: lines over dots
         self._segment = -1
@@ -61,7 +70,7 @@ class Trail:
         looks: list[Always] = []
         rows: list[Grown] = []
         for index, now in enumerate(time.tolist()):
-            if self._segment < 0 or now - self._started >= SEGMENT_NS or now - self._last > GAP_NS:
+            if self._segment < 0 or now - self._started >= self._segment_ns or now - self._last > GAP_NS:
                 looks += self._begin(now)
             elif self._kind == "line" and now - self._last < ROW_NS:
                 continue
@@ -81,7 +90,7 @@ class Trail:
         self._segment += 1
         self._started = now
         self._last_row = 0
-        if self._segment >= SEGMENTS:
+        if self._segment >= self._segments:
             return []
         look: rr.AsComponents
         ground: rr.AsComponents
@@ -94,7 +103,7 @@ class Trail:
         return [Always(self._place(), (look, ground))]
 
     def _place(self) -> str:
-        return f"{self._path}/trail/{self._segment % SEGMENTS}"
+        return f"{self._path}/trail/{self._segment % self._segments}"
 
 
 def grown(extended: Iterable[tuple[Trail, Ints, Ints, Floats, Floats]]) -> list[Entry]:
