@@ -25,7 +25,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 WIDER = 1.25  # than the separation: pairs this near are told too, so that who watches them need not waver
-SAME_M, SAME_MPS = 800.0, 25.0  # what a radar sees beside an aircraft, as fast as it, may be that aircraft
+SAME_M, SAME_MPS = 800.0, 50.0  # what a radar sees beside an aircraft, as fast as it, may be that aircraft
 FASTEST_MPS = 350.0
 EARTH_M = 6.37e6
 _BUCKETS = 1 << 16

@@ -41,6 +41,7 @@ Ints = NDArray[np.int64]
 WIND_WITHIN = 60 * SECOND  # a wind told this lately is still so
 APPROACH = 0.8  # of its speed through the air an aircraft keeps on the way to a landing
 LEAD_S = 2.0  # autopilots fly on until they are so near to a point
+SETTLES = 10 * SECOND  # after a radar's track began: before, it may be an aircraft's, and its velocity is worth little
 LANDED_MPS2, ROUND_MPS2 = 2.0, 20.0  # braking beyond a landing, and at the middle of a circle that is to be flown
 
 
@@ -91,8 +92,9 @@ def forecast(
     up = heights(state.up, state.climb, now, ahead, way.up, way.lands, way.route, horizons)
     mean = np.concatenate([ahead.position, up[..., None]], axis=2)
     known_s, reported = around - state.since_s[:, None], np.array([lane.aircraft is not None for lane in lanes])
+    settled = np.array([lane.aircraft is not None or at - lane.began >= SETTLES for lane in lanes])
     tracks_told = [lane.number for lane in lanes]
-    ways = ways_of(tracks_told, at, state, whole, known_s, up, sigma, horizons_s, by_points, reported, frame)
+    ways = ways_of(tracks_told, at, state, whole, known_s, up, sigma, horizons_s, by_points, settled, reported, frame)
     told_names = [one.names[best] if best >= 0 else None for one, best in zip(goals, way.best.tolist(), strict=True)]
     made = Forecast(
         at,

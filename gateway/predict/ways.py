@@ -68,13 +68,15 @@ def ways_of(
     spread: Spread,
     horizons_s: Sequence[float],
     by_points: Bools,
+    settled: Bools,
     reported: Bools,
     frame: RunwayFrame,
 ) -> Ways:
     """The ways of n tracks that were foretold at an instant.
 
     `whole` are their paths at times `known_s` (n, k) after it, one of them not later than it; `up` (n, h) and `spread` what is
-    foretold at the horizons; `by_points` (n,) who flies to a point and not on as now, `reported` (n,) who says where it is.
+    foretold at the horizons; `by_points` (n,) who flies to a point and not on as now, `settled` (n,) whose way is
+    worth to be compared, `reported` (n,) who says where it is.
     """
     times = grid_s(horizons_s)
     level, course = path_on(times, known_s, whole.position, whole.course)
@@ -90,6 +92,7 @@ def ways_of(
     place = np.concatenate([level, height[..., None]], axis=2)
     beyond = (np.abs(course - course[:, :1]) > FREE_TURN_RAD) & ~by_points[:, None]
     place[beyond | _joins_final(place, frame) & ~by_points[:, None]] = np.nan
+    place[~settled] = np.nan
     at = np.full(len(tracks), made, dtype=np.int64)
     return Ways(np.array(tracks, dtype=np.int64), at, place, course, along, across, upright, state.has_height, reported)
 

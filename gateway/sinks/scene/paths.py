@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
 from gateway.frames import RunwayFrame
+from gateway.geodesy import wrap_rad
 from gateway.picture import Picture
 from gateway.predict import Predicted
 from gateway.predict.approach import deviations
+from gateway.predict.ways import path_on
 from gateway.settings import Site
 from gateway.sinks.scene import columns, style
 from gateway.sinks.scene.entry import Always, Entry, entity
@@ -22,6 +25,8 @@ from gateway.sinks.scene.sheaf import Sheaf
 
 Floats = NDArray[np.float64]
 
+DRAWN_EVERY_S = 5.0
+SHOWN, LEAST_SHOWN_M = 0.5, 50.0  # sigmas up to this share of the way, or so much, are drawn
 _CIRCLE = np.stack([f(np.linspace(0.0, 2.0 * math.pi, 25)) for f in (np.cos, np.sin)] + [np.zeros(25)], axis=-1)
 
 
@@ -68,12 +73,12 @@ class ApproachScene:
 
 
 class PredictScene:
-    """Draws the newest prediction of each track: its path, its corridor of one sigma, and a ring at each point."""
+    """Draws the newest prediction of each track: its path, its corridor of one sigma, an ellipse of one sigma at each point."""
 
     def __init__(self, site: Site) -> None:
-        self._frame = RunwayFrame(site.runway)
+        self._frame, self._landing_rad = RunwayFrame(site.runway), site.runway.landing_compass_rad
         self._newest: Lately[int] = Lately()
-        self._here: dict[int, Floats] = {}  # the last position of each track: where its prediction starts
+        self._here: dict[int, Start] = {}  # the last state of each track: where its prediction starts
         self._looked: Lately[int] = Lately()
 
     def entries(self, pictures: Sequence[Picture], flights: Sequence[Flown]) -> list[Entry]:
@@ -84,7 +89,7 @@ class PredictScene:
             for track, made, strips in self._made(picture.predict, known):
                 found.setdefault(track, []).append((made, picture.step, strips))
         for flown in flights:
-            self._here[flown.track] = flown.runway_m[-1]
+            self._here[flown.track] = flown.runway_m[-1], _direction(flown.velocity_mps[-1])
         return self._rows(found) if found else []
 
     def end(self, track: int, at: int) -> None:
@@ -97,29 +102,30 @@ class PredictScene:
         """The strips of each prediction in one picture: (track, made, strips)."""
         if not len(predicted.made):
             return []
-        found = []
-        keys = np.stack([predicted.track, predicted.made], axis=-1)
-        for track, made in dict.fromkeys(map(tuple, keys.tolist())):
+        found: list[tuple[int, int, list[Floats]]] = []
+        other = (predicted.track[1:] != predicted.track[:-1]) | (predicted.made[1:] != predicted.made[:-1])
+        for rows in np.split(np.arange(len(predicted.made)), np.flatnonzero(other) + 1):
+            track, made = int(predicted.track[rows[0]]), int(predicted.made[rows[0]])
             if made < self._newest.at(track):
                 continue
             self._newest.is_new(track, made)
-            index = np.flatnonzero((predicted.track == track) & (predicted.made == made))
-            methods = dict.fromkeys(predicted.method[row] for row in index)
-            strips: list[Floats] = []
-            for method in methods:
-                mine = index[[predicted.method[row] == method for row in index]]
-                mine = mine[np.argsort(predicted.horizon_s[mine], kind="stable")]
-                start = self._start(track, made, known)
-                strips += corridor(start, predicted.runway_m[mine], predicted.sigma_m[mine])
-            found.append((track, made, strips))
+            mine = rows[np.argsort(predicted.horizon_s[rows], kind="stable")]
+            ahead = Ahead(
+                predicted.horizon_s[mine],
+                predicted.runway_m[mine],
+                self._landing_rad - predicted.course_rad[mine],
+                predicted.sigma_along_m[mine],
+                predicted.sigma_across_m[mine],
+            )
+            found.append((track, made, corridor(self._start(track, made, known), ahead)))
         return found
 
-    def _start(self, track: int, made: int, known: dict[int, Flown]) -> Floats | None:
+    def _start(self, track: int, made: int, known: dict[int, Flown]) -> Start | None:
         flown = known.get(track)
         if flown is not None:
             row = int(np.searchsorted(flown.time, made, side="right")) - 1
             if row >= 0:
-                return np.asarray(flown.runway_m[row])
+                return np.asarray(flown.runway_m[row]), _direction(flown.velocity_mps[row])
         return self._here.get(track)
 
     def _rows(self, found: dict[int, list[tuple[int, int, list[Floats]]]]) -> list[Entry]:
@@ -142,18 +148,57 @@ class PredictScene:
         return [*entries, *sheaf.rows(lambda track: entity("predict", track), *drawn)]
 
 
-def corridor(start: Floats | None, ahead_m: Floats, sigma_m: Floats) -> list[Floats]:
-    """A predicted path as lines (k, 3): the path, its edges at one sigma to either side, a ring at each point.
+Start = tuple[Floats, float]
+"""Where (3,) in the runway frame a track is, and its course, from x to the left."""
 
-    `ahead_m` (n, 3) in the order of time, `sigma_m` (n,); `start` (3,) is where the track is now, if that is
-    known.
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ahead:
+    """A prediction of one track: n points in the order of time, in the runway frame, with courses from x to the left."""
+
+    horizon_s: Floats
+    place: Floats  # (n, 3)
+    course: Floats
+    along: Floats  # sigmas
+    across: Floats
+
+
+def corridor(start: Start | None, ahead: Ahead) -> list[Floats]:
+    """A predicted path as lines (k, 3): the path, its edges at one sigma to either side, an ellipse at each point.
+
+    `start` is where the track is now, if that is known. Edges and ellipses end where sigma is more than half of the way there:
+    from there on they would say no more than that nobody knows.
     """
-    path = ahead_m if start is None else np.concatenate([start[None], ahead_m])
-    sigma = sigma_m if start is None else np.concatenate([[0.0], sigma_m])
-    rings = [point + radius * _CIRCLE for point, radius in zip(ahead_m, sigma_m, strict=True) if radius > 0.0]
-    if len(path) < 2:
-        return [np.repeat(path, 2, axis=0), *rings]
-    along = np.gradient(path[:, :2], axis=0)
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
-    aside = np.stack([-along[:, 1], along[:, 0], np.zeros(len(path))], axis=-1) * np.nan_to_num(sigma)[:, None]
-    return [path, path + aside, path - aside, *rings]
+    if start is None:
+        times, known, place, course = ahead.horizon_s, ahead.horizon_s, ahead.place, ahead.course
+        across = ahead.across
+    else:
+        known = np.concatenate([[0.0], ahead.horizon_s])
+        place, course = np.concatenate([start[0][None], ahead.place]), np.concatenate([[start[1]], ahead.course])
+        across = np.concatenate([[0.0], ahead.across])
+        times = np.unique(np.concatenate([known, np.arange(0.0, known[-1], DRAWN_EVERY_S)]))
+    if len(times) < 2:
+        return [np.repeat(place, 2, axis=0), *_ellipses(ahead)]
+    course = course[0] + np.concatenate([[0.0], np.cumsum(wrap_rad(np.diff(course)))])
+    level, heading = (part[0] for part in path_on(times, known[None], place[None, :, :2], course[None]))
+    path = np.concatenate([level, np.interp(times, known, place[:, 2])[:, None]], axis=1)
+    sigma = np.interp(times, known, across)
+    flown = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(level, axis=0) ** 2).sum(axis=1)))])
+    shown = sigma <= np.maximum(SHOWN * flown, LEAST_SHOWN_M)
+    last = len(times) if shown.all() else max(int(shown.argmin()), 2)
+    aside = sigma[:, None] * np.stack([-np.sin(heading), np.cos(heading), np.zeros(len(times))], axis=-1)
+    edges = [(path + side * aside)[:last] for side in (1.0, -1.0)]
+    return [path, *edges, *_ellipses(ahead, times[last - 1])]
+
+
+def _ellipses(ahead: Ahead, until_s: float = math.inf) -> list[Floats]:
+    drawn = []
+    for row in np.flatnonzero((ahead.horizon_s <= until_s) & (ahead.along > 0.0)).tolist():
+        sine, cosine = math.sin(ahead.course[row]), math.cos(ahead.course[row])
+        along, across = ahead.along[row] * _CIRCLE[:, :1], ahead.across[row] * _CIRCLE[:, 1:2]
+        drawn.append(ahead.place[row] + along * [cosine, sine, 0.0] + across * [-sine, cosine, 0.0])
+    return drawn
+
+
+def _direction(velocity_mps: Floats) -> float:
+    return math.atan2(velocity_mps[1], velocity_mps[0])
