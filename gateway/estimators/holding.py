@@ -30,7 +30,7 @@ _UNIT = np.eye(2)
 _ORDER = np.array([0, 0, 1, 1, 2, 2])  # which of the three each of these is
 _HELD = SIZE + np.array([0, 1] * 3)  # the acceleration that acts on it
 _POINTS, _SHARES = (0.5 * part for part in np.polynomial.legendre.leggauss(8))
-_POINTS = _POINTS + 0.5
+_POINTS, _SHARES = np.append(_POINTS + 0.5, 1.0), np.append(_SHARES, 0.0)  # the end counts for nothing in the integral
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,11 +56,11 @@ def turn_along(noise: Floats, course: Floats, share: Floats, most: Floats, uneve
 
 def add_held(carry: Floats, noise: Floats, elapsed_s: Floats, course: Floats, held: Held, holds: Bools) -> None:
     """Fill in what two states more do to transition and noise (n, m, 11, 11) over times (n,): modes (m,) hold, or do not."""
-    response = np.stack(_response(elapsed_s, held.lasts_s), axis=-1)
     sigma2 = held.across_mps2**2
     turned = _turned(course, np.array([held.along_mps2 / held.across_mps2]))
+    response, grown = _answers(elapsed_s, held.lasts_s)
     noise[..., SIZE:, SIZE:] = sigma2 * turned
-    block = _along_both(sigma2 * _grown(elapsed_s, held.lasts_s), turned[:, 0])
+    block = _along_both(sigma2 * grown, turned[:, 0])
     for mode in np.flatnonzero(holds).tolist():
         carry[:, mode, _LEVEL, _HELD] = response[:, _ORDER]
         noise[:, mode, SIZE:, SIZE:] = 0.0
@@ -85,22 +85,24 @@ def _turned(course: Floats, along: Floats, across: Floats | float = 1.0) -> Floa
     return np.asarray(square * _UNIT + ((along * along)[:, None, None] - square) * way)
 
 
-def _response(elapsed_s: Floats, lasts_s: float) -> tuple[Floats, Floats, Floats]:
-    """What an acceleration of 1 adds to position and velocity over times (...), and what is left of it."""
-    x = elapsed_s / lasts_s
+def _answers(elapsed_s: Floats, lasts_s: float) -> tuple[Floats, Floats]:
+    """What becomes of an acceleration over times (n,).
+
+    (n, 3): what one of 1 adds to position and velocity, and what is left of it; and the covariance (n, 3, 3) that the noise
+    of one of variance 1 makes of these.
+    """
+    t = elapsed_s[:, None]
+    x = t * (_POINTS / lasts_s)
     lost = np.expm1(-x)
-    return lasts_s * lasts_s * (lost + x), lasts_s * -lost, 1.0 + lost
-
-
-def _grown(elapsed_s: Floats, lasts_s: float) -> Floats:
-    """Covariance (n, 3, 3) of position, velocity, acceleration that the noise of an acceleration of variance 1 makes."""
-    t = np.minimum(elapsed_s, LONG * lasts_s)[:, None]
-    response = np.stack(_response(t * _POINTS, lasts_s), axis=1)
-    found: Floats = (response * (2.0 / lasts_s * t * _SHARES)[:, None]) @ response.transpose(0, 2, 1)
+    response = np.empty((len(t), 3, len(_POINTS)))
+    response[:, 0] = lasts_s * lasts_s * (lost + x)
+    response[:, 1] = -lasts_s * lost
+    response[:, 2] = 1.0 + lost
+    grown: Floats = (response * (t * (2.0 / lasts_s * _SHARES))[:, None]) @ response.transpose(0, 2, 1)
     long = elapsed_s > LONG * lasts_s
     if long.any():
-        found[long] = _grown_long(elapsed_s[long] / lasts_s, lasts_s)
-    return found
+        grown[long] = _grown_long(elapsed_s[long] / lasts_s, lasts_s)
+    return response[:, :, -1], grown
 
 
 def _grown_long(x: Floats, lasts_s: float) -> Floats:

@@ -60,17 +60,15 @@ def carried(shaken: Shaken, elapsed_s: Floats, turn_rate: Floats, size: int = SI
     entries[..., _BACK] = -across
     entries[..., _ONE], entries[..., _TIME] = 1.0, t
     keep = entries[..., _KEEP] = np.exp(-t / shaken.error_time_s)
-    level, upright, bend = shaken.level * t, shaken.upright * t, _bend(angle, sine)
-    entries[..., _PLACE] = level * t * t * 2.0 * bend
-    entries[..., _BOTH] = level * t * 0.5 * half * half
-    aside = entries[..., _ASIDE] = level * t * angle * bend
+    bend = _bend(angle, sine)
+    entries[..., _PLACE] = 2.0 * t * t * bend
+    entries[..., _BOTH] = 0.5 * t * half * half
+    aside = entries[..., _ASIDE] = t * angle * bend
     entries[..., _OTHER] = -aside
-    entries[..., _SPEED] = level
-    entries[..., _HEIGHT], entries[..., _CLIMBING], entries[..., _CLIMB] = (
-        upright * t * t / 3.0,
-        upright * t * 0.5,
-        upright,
-    )
+    entries[..., _SPEED] = entries[..., _CLIMB] = 1.0
+    entries[..., _HEIGHT], entries[..., _CLIMBING] = t * t / 3.0, 0.5 * t
+    entries[..., _PLACE:_HEIGHT] *= (t * shaken.level)[..., None]
+    entries[..., _HEIGHT:_ERROR] *= (t * shaken.upright)[..., None]
     entries[..., _ERROR] = shaken.error_m2 * (1.0 - keep * keep)
     return entries.take(_CARRY[:size, :size], axis=-1), entries.take(_NOISE[:size, :size], axis=-1)
 
