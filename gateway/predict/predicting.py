@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from operator import attrgetter
+from typing import Any
 
 from gateway.align import SECOND
 from gateway.frames import RunwayFrame
@@ -58,7 +60,8 @@ class Predicting:
         known = self.tellings.by_aircraft.get(said.aircraft)
         now = tellings.by_aircraft[said.aircraft]
         if known is not None and known.plan is now.plan and known.intents is now.intents:
-            return replace(self, tellings=tellings)
+            # A wind. They come thick, and `replace` takes three times as long.
+            return Predicting(tellings, *_beside_tellings(self))
         goals = {aircraft: one for aircraft, one in self.goals.items() if aircraft != said.aircraft}
         return replace(self, tellings=tellings, goals=goals)
 
@@ -83,3 +86,6 @@ class Predicting:
             return Predicting(tellings)
         remembered, gates = self.remembered.without(lanes), self.gates.without(lanes)
         return replace(self, tellings=tellings, goals=goals, remembered=remembered, gates=gates)
+
+
+_beside_tellings: Callable[[Predicting], tuple[Any, ...]] = attrgetter(*(one.name for one in fields(Predicting)[1:]))
