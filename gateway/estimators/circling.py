@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators.turns_and_straights import FULL_TURN, Path, angle_to_go
+from gateway.geodesy import wrap_rad
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 ON_CIRCLE = 1.3  # radii: who is this near to a circle's middle is on it
+ALONG_RAD = 0.35  # who is on a circle and flies so much elsewhere than along it is just coming to it
 FOR_GOOD_RAD = 1000.0
 QUARTERS, QUARTER_RAD = 8, 0.5 * math.pi  # of a circle: two turns, and all that is left at once
 
@@ -65,7 +67,7 @@ def go_round(
     round_it = ~np.isnan(radius)
     if not round_it.any():
         return
-    _bend(path, np.where(arrived, math.nan, radius), leg, turning_rps, speed_on(path.course))
+    _bend(path, following[:, leg], radius, leg, arrived, turning_rps, speed_on(path.course))
     way = following[:, leg] - path.position
     distance = np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1])
     near = (distance > 0.5 * np.abs(radius)) & (distance <= ON_CIRCLE * np.abs(radius))
@@ -83,10 +85,20 @@ def go_round(
         go = go - arc
 
 
-def _bend(path: Path, radius: Floats, leg: int, turning_rps: Floats, ground: Floats) -> None:
-    """Who flew at the middle of a circle of a radius (n,), NaN = nobody does, turns aside until it flies along the circle."""
+def _bend(
+    path: Path, centre: Floats, radius: Floats, leg: int, arrived: Bools, turning_rps: Floats, ground: Floats
+) -> None:
+    """Who flew at the middle (n, 2) of a circle of a radius (n,), NaN = nobody does, turns aside until it flies along the circle.
+
+    Who has arrived at it but does not fly along it yet turns until it does.
+    """
     round_it = ~np.isnan(radius)
     own = ground / turning_rps
-    size = np.where(round_it, np.abs(radius), 0.0)
-    angle = np.where(round_it, np.arctan2(np.sqrt(size * size + 2.0 * size * own), own), 0.0)
-    path.extend(ground, np.where(round_it, -np.sign(radius) * turning_rps, 0.0), angle / turning_rps, leg)
+    size, side = np.where(round_it, np.abs(radius), 0.0), np.sign(np.where(round_it, radius, 1.0))
+    aside = -side * np.arctan2(np.sqrt(size * size + 2.0 * size * own), own)
+    way = centre - path.position
+    along = np.arctan2(way[:, 1], way[:, 0]) - 0.5 * math.pi * side
+    off = np.nan_to_num(wrap_rad(along - path.course))
+    angle = np.where(arrived, np.where(np.abs(off) > ALONG_RAD, off, 0.0), aside)
+    angle = np.where(round_it, angle, 0.0)
+    path.extend(ground, np.sign(angle) * turning_rps, np.abs(angle) / turning_rps, leg)

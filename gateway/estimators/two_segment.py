@@ -54,6 +54,7 @@ class Ahead:
     turned: Floats  # (n, h) radians turned by until then, whichever way
     passed: Floats  # (n, h) how many points of the route were passed by then
     over_s: Floats  # (n, h) seconds past the route's last point
+    slower_s: Floats  # (n, h) seconds since it was to fly slower
     follows: Bools  # (n,) whether there is a path to the first point at all
 
     def first(self, count: int) -> Ahead:
@@ -65,6 +66,7 @@ class Ahead:
             self.turned[:, one],
             self.passed[:, one],
             self.over_s[:, one],
+            self.slower_s[:, one],
             self.follows,
         )
 
@@ -114,7 +116,7 @@ def ahead(
     target, arrived = entered(path, following[:, 0], circles, 0, speed / turning_rps)
     turn, rate, follows = _first_turn(now, speed, course, target, following, turning_rps, rule)
     turn, follows = np.where(arrived, 0.0, turn), follows | arrived
-    ground, cornering = speed, turning_rps
+    ground, cornering, slower_from = speed, turning_rps, np.full(n, math.inf)
 
     def speed_on(heading: Floats) -> Floats:
         return ground_speed(heading, air, calm)
@@ -122,6 +124,7 @@ def ahead(
     for leg in range(route.shape[1]):
         if leg:
             if slower is not None:
+                slower_from = np.where(slower[:, leg] < 1.0, np.minimum(slower_from, path.time_s), slower_from)
                 air = air * slower[:, leg]
             target, arrived = entered(path, following[:, leg], circles, leg, ground / turning_rps)
             turn, rate = _next_turn(path, target, ground, cornering)
@@ -143,6 +146,7 @@ def ahead(
         np.where(chosen, path.turned_at, on.turned_at),
         np.where(chosen, path.passed_at, 0.0),
         np.where(chosen, np.maximum(path.horizons - path.time_s[:, None], 0.0), 0.0),
+        np.where(chosen, np.maximum(path.horizons - slower_from[:, None], 0.0), 0.0),
         follows,
     )
 

@@ -19,6 +19,7 @@ from gateway.predict.candidates import weighed
 from gateway.predict.choosing import Chosen, chosen
 from gateway.predict.gates import Gates, Judged
 from gateway.predict.heights import heights
+from gateway.predict.hindsight import MOVING_MPS, kept, learnt, scaled
 from gateway.predict.predicting import Predicting
 from gateway.predict.spread import (
     ALONG_POINTS,
@@ -28,10 +29,11 @@ from gateway.predict.spread import (
     ROUND_A_POINT,
     beside,
     spread,
+    wind_sigma,
 )
 from gateway.predict.states import State
 from gateway.predict.table import Forecast
-from gateway.predict.thinking import motions
+from gateway.predict.thinking import TURNS_RAD, motions
 from gateway.predict.ways import ways_of
 from gateway.settings import Site
 
@@ -88,7 +90,14 @@ def forecast(
         circles=way.rounds if np.isfinite(way.rounds.radius).any() else None,
     )
     ahead, by_points = whole.first(horizons.shape[1]), whole.follows | way.circles
-    sigma = spread(now, whole, horizons, state.place_sigma, _rests(way, whole), way.confidence)
+    unscaled = spread(
+        now, whole, horizons, state.place_sigma, _rests(way, whole), way.confidence, wind_sigma(now, winds)
+    )
+    minds = learnt(minds, at, state, horizons_s)
+    turns = (ahead.turned > TURNS_RAD) | (now.unsettled > TURNS_RAD)[:, None]
+    sigma = scaled(minds, unscaled, turns)
+    moves = now.speed >= MOVING_MPS
+    minds = kept(minds, at, horizons_s, ahead.position, ahead.course, unscaled, turns, moves)
     up = heights(state.up, state.climb, now, ahead, way.up, way.lands, way.route, horizons)
     mean = np.concatenate([ahead.position, up[..., None]], axis=2)
     known_s, reported = around - state.since_s[:, None], np.array([lane.aircraft is not None for lane in lanes])

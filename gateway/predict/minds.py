@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 UNKNOWN = -(1 << 62)
+LEARNT, KEPT = 4, 5  # the first horizons, of each of which so many predictions are kept until they come due
+NOT_KEPT = 1 << 62
 NOBODY: Mapping[int, int] = MappingProxyType({})
 
 
@@ -40,6 +42,12 @@ class Minds:
     trust: Floats  # (n,) that it goes where it declared
     declared_at: Ints  # (n,) since when it is said to go there
     circled: Floats  # (n,) radians flown round it, if it is a point that is flown round
+    due_at: Ints  # (n, LEARNT, KEPT) ns, when predictions come due; NOT_KEPT = none
+    foretold: NDArray[
+        np.float32
+    ]  # (n, LEARNT, KEPT, 6) where it was to be, east and north; course, sigmas; 1 = with a turn
+    sigmas: Floats  # (n, 2, LEARNT, 2) without and with a turn: sum of how many sigmas they were off along and across, faded
+    counted: Floats  # (n, 2, LEARNT) of how many predictions, in horizons' worths
 
     @classmethod
     def empty(cls, n: int) -> Minds:
@@ -63,6 +71,10 @@ class Minds:
             zero,
             np.full(n, UNKNOWN),
             zero,
+            np.full((n, LEARNT, KEPT), NOT_KEPT),
+            np.zeros((n, LEARNT, KEPT, 6), dtype=np.float32),
+            np.zeros((n, 2, LEARNT, 2)),
+            np.zeros((n, 2, LEARNT)),
         )
 
     @property

@@ -22,17 +22,26 @@ ALONG_POINTS, ENDS_LANDED, ENDS_ROUND, ROUND_A_POINT, BY_MODEL = range(5)
 """What is known of a way: points to its end and maybe beyond it; to a landing; to a circle; on a circle; nothing."""
 
 # How early or late it is on a way along points, seconds: a share of the time, more for each radian of turns on the way and for
-# each radian that it turned lately, and more towards a landing. Beside the way: an amount that grows slowly, and what is left
-# of a turn. Measured on SITL's aeroplanes (docs/papers/000-intent.md); in seconds they hold for a boat of 5 m/s as well.
-LATE, LATE_A_TURN, LATE_IN_TURN, LATE_LANDING = 0.01, 0.75, 0.9, 0.05
-BESIDE, BESIDE_GROWS, BESIDE_AFTER_TURN = 0.01, 0.7, 0.8
-TURNING_S, TURNING_FADES_S = 1.8, 25.0  # beside the way of who turned lately, and its fading
-UNSETTLED_RAD = 0.25  # by at least so much
+# each radian that it turned lately, and where it is to fly slower. Beside the way: autopilots wander about a line, swing over
+# after a turn, and more while they are in one. What is a share of speed or time holds for a boat of 5 m/s as well.
+CRUISE, LATE_A_TURN, LATE_IN_TURN, LATE_SLOWER, LATE_LANDED_S = 0.005, 0.43, 0.33, 0.05, 2.0
+RESTS, ROUNDS, GOES_ANYWHERE = (
+    (0.2, 0.0),
+    (0.25, 0.25),
+    (1.2, 0.7),
+)  # of speed: along and across, past the end of the way
+WANDERS_S, WANDERS_FOR_S, WANDERS_A_TURN = 0.116, 40.0, 0.03
+SWINGS, SWINGS_NOW, SWINGS_FOR_S = 0.49, 2.05, 4.0
+SPEED_KEPT, ACCELERATES_S = (
+    0.32,
+    1.7,
+)  # shares of the filter's sigma of speed and of the acceleration now, over all the way
+ON_LINE_RAD = 0.3  # who has turned by more flies along a line between two points
 SETTLES_S = 10.0  # after a turn
 EARLY_S, EARLY = 2.0, 0.06  # how much earlier and later the way is looked at
 MANOEUVRES = 0.02  # rad2/s of course: how fast a course wanders that nobody has declared, turns and straights together
-ACCELERATES_S = 6.0  # who changes its speed goes on doing so for this long
 DOUBTED = 0.9  # below this confidence the way may also be another one
+TOLD_WIND_MPS, UNKNOWN_WIND = 2.5, 0.1  # a told wind may be wrong by so much; an unknown one is this share of the speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +59,15 @@ def beside(horizons_s: Floats) -> Floats:
     return np.concatenate([horizons_s, *before], axis=1)
 
 
+def wind_sigma(now: Motions, winds: Floats) -> Floats:
+    """How far (n,) the wind is from what it is taken for, (n, 2), 0 = nobody told it: m/s an axis.
+
+    What a vehicle says of it, it learns in turns.
+    """
+    told = (winds != 0.0).any(axis=1)
+    return np.asarray(np.where(told, TOLD_WIND_MPS / (1.0 + now.turned), UNKNOWN_WIND * now.speed))
+
+
 def spread(
     now: Motions,
     whole: Ahead,
@@ -57,37 +75,56 @@ def spread(
     place_sigma: Floats,
     kinds: Ints,
     confidence: Floats,
+    wind_mps: Floats,
 ) -> Spread:
     """Of n aircraft's predictions at horizons (n, h), of the kinds (n,) named above, believed with a confidence (n,).
 
     `whole` is the path at `beside`: who is early or late is somewhere else on it, which in a turn is also to one side.
+    `wind_mps` (n,) is how far the wind may be from what it is taken for, m/s an axis.
     """
     t, h = horizons_s, horizons_s.shape[1]
     speed, kind = now.speed[:, None], kinds[:, None]
-    here, course, turned = whole.position[:, :h], whole.course[:, :h], whole.turned[:, :h]
-    lately = turned - whole.turned[:, 3 * h :]
-    landing = np.where(kind == ENDS_LANDED, LATE_LANDING * t, 0.0)
-    late = (LATE * t) ** 2 + (LATE_A_TURN * turned) ** 2 + (LATE_IN_TURN * lately) ** 2 + landing**2
-    way = np.stack([np.cos(course), np.sin(course)], axis=-1)
-    to_side = np.zeros(t.shape)
+    by_model, lands, rounds = kind == BY_MODEL, kind == ENDS_LANDED, kind == ENDS_ROUND
+    turned, over = whole.turned[:, :h], whole.over_s[:, :h]
+    lately, in_turn = turned - whole.turned[:, 3 * h :], now.unsettled[:, None]
+    ends_along, ends_across = (
+        np.where(lands, RESTS[axis], np.where(rounds, ROUNDS[axis], GOES_ANYWHERE[axis])) * over for axis in (0, 1)
+    )
+    late = (CRUISE * t) ** 2 + (LATE_A_TURN * turned) ** 2 + (LATE_IN_TURN * in_turn) ** 2
+    late = late + (LATE_SLOWER * whole.slower_s[:, :h]) ** 2 + np.where(lands & (over > 0.0), LATE_LANDED_S**2, 0.0)
+    late = late + ends_along * ends_along
+    wanders = WANDERS_S**2 * np.where(turned > ON_LINE_RAD, 1.0, 2.0 * (1.0 - np.exp(-t / WANDERS_FOR_S)))
+    swings = (SWINGS * lately) ** 2 + (SWINGS_NOW * in_turn) ** 2 * np.exp(-t / SWINGS_FOR_S)
+    beside_s = wanders + swings + (WANDERS_A_TURN * turned) ** 2 + ends_across * ends_across
+    doubt = np.maximum(DOUBTED - np.nan_to_num(confidence, nan=DOUBTED), 0.0)[:, None]
+    unknown = MANOEUVRES * speed * speed * np.where(by_model, 1.0, doubt) * t**3
+    place = place_sigma[:, None] ** 2 + np.where(kind == ROUND_A_POINT, (0.25 * speed * t) ** 2, 0.0)
+    gains = (SPEED_KEPT * now.speed_sigma[:, None]) ** 2 + (ACCELERATES_S * now.acceleration[:, None]) ** 2
+    by_points = speed * speed * late + _of_wind(now, whole, t, wind_mps)
+    along = place + gains * t * t + np.where(by_model, 0.0, by_points) + unknown / 6.0
+    drifts = np.where(
+        by_model, (now.speed_sigma[:, None] * t) ** 2, speed * speed * beside_s + _to_side(whole, t) * late
+    )
+    return Spread(np.sqrt(along), np.sqrt(place + drifts + unknown / 3.0))
+
+
+def _to_side(whole: Ahead, t: Floats) -> Floats:
+    """How far (n, h) to one side of where it should be it is for each second that it is early or late there, m/s, squared."""
+    h = t.shape[1]
+    here, course = whole.position[:, :h], whole.course[:, :h]
+    cosine, sine = np.cos(course), np.sin(course)
+    squares = np.zeros(t.shape)
     for part in (slice(h, 2 * h), slice(2 * h, 3 * h)):
         off = whole.position[:, part] - here
-        to_side = to_side + (off[..., 1] * way[..., 0] - off[..., 0] * way[..., 1]) ** 2
-    to_side = (
-        0.5 * to_side * late / (EARLY_S + EARLY * t) ** 2
-    )  # the mean over a Gaussian of sigma `late`, at three places
-    turning = TURNING_S * np.minimum(now.unsettled / UNSETTLED_RAD, 1.0)[:, None] * np.exp(-t / TURNING_FADES_S)
-    beside_s = (BESIDE * t**BESIDE_GROWS) ** 2 + (BESIDE_AFTER_TURN * lately) ** 2 + turning * turning
-    over = np.where(kind == ENDS_LANDED, 0.0, whole.over_s[:, :h])
-    free = np.where(kind == BY_MODEL, t, over)
-    doubt = np.where(kinds == BY_MODEL, 0.0, np.maximum(DOUBTED - np.nan_to_num(confidence, nan=DOUBTED), 0.0))[:, None]
-    unknown = MANOEUVRES * speed * speed * (free**3 + doubt * t**3)
-    radius = speed / now.turning[:, None]
-    round_about = np.where((kind == ENDS_ROUND) & (over > 0.0), (1.5 * radius) ** 2, 0.0)
-    round_about = round_about + np.where(kind == ROUND_A_POINT, (0.25 * speed * t) ** 2, 0.0)
-    place = place_sigma[:, None] ** 2 + round_about
-    gains = now.speed_sigma[:, None] ** 2 + (ACCELERATES_S * now.acceleration[:, None]) ** 2
-    by_points = kind != BY_MODEL
-    along = place + gains * t * t + np.where(by_points, speed * speed * late, 0.0) + unknown / 6.0
-    drifts = np.where(by_points, speed * speed * beside_s + to_side, (now.speed_sigma[:, None] * t) ** 2)
-    return Spread(np.sqrt(along), np.sqrt(place + drifts + unknown / 3.0))
+        squares = squares + (off[..., 1] * cosine - off[..., 0] * sine) ** 2
+    return 0.5 * squares / (EARLY_S + EARLY * t) ** 2  # the mean over a Gaussian, at three places
+
+
+def _of_wind(now: Motions, whole: Ahead, t: Floats, wind_mps: Floats) -> Floats:
+    """What a wrong wind makes (n, h), m2: it is felt as far as the way leads elsewhere than straight on, where it is known.
+
+    Who flies on at his ground speed is where it leads whatever the wind.
+    """
+    elsewhere = whole.position[:, : t.shape[1]] - now.position[:, None] - now.velocity[:, None] * t[..., None]
+    squares = elsewhere[..., 0] ** 2 + elsewhere[..., 1] ** 2
+    return np.asarray(squares * (wind_mps / np.maximum(now.speed, 1.0))[:, None] ** 2)

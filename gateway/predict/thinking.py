@@ -188,9 +188,11 @@ def trusted(before: Minds, at: int, now: Motions, goal: Floats, circles: Bools, 
     likelihood = np.where(
         circles & (distance < 2.0 * NEAR_RADII * radius), np.where(now.side != 0, 0.5, WANDERS), likelihood
     )
-    silent = ~circles & ((distance < NEAR_RADII * radius) | ((at - since) / SECOND < REACTS_S)) | (
-        now.speed < LEAST_SPEED_MPS
-    )
+    past = (np.abs(np.nan_to_num(off)) > 0.5 * math.pi) & (
+        distance > REACTS_S * now.speed
+    )  # and nobody said what is next
+    near = (distance < NEAR_RADII * radius) & ~past
+    silent = ~circles & (near | ((at - since) / SECOND < REACTS_S)) | (now.speed < LEAST_SPEED_MPS)
     weight = np.where(silent, 1.0, (likelihood / WANDERS) ** elapsed_s)
     after = trust * weight / (trust * weight + 1.0 - trust)
     after = after + elapsed_s * (RESUMES * (1.0 - after) - STOPS * after)

@@ -123,6 +123,50 @@ def test_a_mission_uploaded_in_flight_takes_the_place_of_the_old_one() -> None:
     assert (east, north) == (pytest.approx(0.0, abs=20.0), pytest.approx(24 * SPEED + 60 * SPEED, abs=60.0))
 
 
+def test_an_outdated_plan_is_doubted_ten_seconds_after_its_point_was_passed() -> None:
+    """It flies on past the point, and nobody says which is the next: confidence falls, and the prediction is the model's."""
+    told = rows(run([plan((0.0, 900.0), (6000.0, 900.0)), goes_to(1), *northward(36)]))
+    assert all(one[1] == "two segments" for one in told if 5.0 < one[0] < 15.0)
+    late = [one for one in told if one[0] >= 25.0]
+    assert late
+    assert all(one[1] == "model" and one[4] < 0.5 for one in late)
+
+
+def test_an_item_of_a_plan_that_nobody_knows_is_no_goal() -> None:
+    """The plan is missing: which item is flown to says nothing, and the prediction is the model's from the beginning."""
+    told = rows(run([goes_to(4), *northward(12)]))
+    assert told
+    assert all(one[1:4] == ("model", None, None) for one in told)
+
+
+def test_who_comes_back_to_its_plan_is_believed_again() -> None:
+    """Doubted while it flew elsewhere, believed again once it has flown at its goal for half a minute."""
+    away = [report(half / 2, 0.0, SPEED * half / 2, 0.0) for half in range(40)]
+    back = [report(20.0 + half / 2, SPEED * half / 2, 1200.0, 90.0) for half in range(100)]
+    told = rows(run([plan((20_000.0, 1200.0)), goes_to(1), *away, *back]))
+    assert all(one[1] == "model" for one in told if 12.0 <= one[0] < 20.0)
+    assert [one[1] for one in told if one[0] >= 60.0] == ["two segments"] * len([one for one in told if one[0] >= 60.0])
+
+
+def test_a_loiter_is_flown_round_at_the_radius_that_the_mission_says() -> None:
+    """Two turns of 900 m about a point 1.6 km ahead: in 60 s it is on that circle; with another radius it would be elsewhere."""
+    where = place(0.0, 3000.0)
+    items = (PlanPoint(1, "loiter", *where, altitude_msl_m=1000.0, radius_m=900.0, turns=2.0),)
+    pictures = run([FlightPlan(AIRCRAFT, T0, T0, items), goes_to(1), *northward(24)])
+    east, north = ahead(pictures)
+    assert math.hypot(east, north - 3000.0) == pytest.approx(900.0, rel=0.03)
+    assert rows(pictures)[-1][1:4] == ("two segments", "loiter 1", "declared")
+
+
+def test_further_points_of_a_plan_are_flown_one_after_another() -> None:
+    """Three corners within the horizon: in 60 s it is on the way to the fourth point, westward."""
+    corners = plan((0.0, 1800.0), (1100.0, 1800.0), (1100.0, 2900.0), (-9000.0, 2900.0))
+    pictures = run([corners, goes_to(1), *northward(20)], options=Options(horizons_s=(10.0, 60.0)))
+    last = [picture.predict for picture in pictures if len(picture.predict.made)][-1]
+    assert ahead(pictures) == (pytest.approx(350.0, abs=300.0), pytest.approx(2900.0, abs=150.0))
+    assert math.degrees(float(last.course_rad[-1])) == pytest.approx(270.0, abs=8.0)
+
+
 def test_what_was_said_earlier_but_heard_later_changes_nothing() -> None:
     """Plans and intents count by when they were valid."""
     newer, older = goes_to(2, 5.0), replace(goes_to(1, 1.0), received_at=T0 + 8 * SECOND)

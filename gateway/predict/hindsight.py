@@ -1,0 +1,111 @@
+"""What became of earlier predictions: by how much sigmas were too small or too large for each track, and are so from now on.
+
+Of each of the first horizons a few predictions are kept until they come due. Then the track itself tells how far off they were,
+in sigmas along and across; the mean of that, against what it would be for a Gaussian, faded and begun with a share of "as they
+should be", scales the sigmas that follow. Predictions without a turn and such with one learn apart.
+
+Arrays are over n tracks. A track knows only what it has seen itself, at instants of its own predictions: how arrivals fall into
+ticks changes nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.align import SECOND
+from gateway.predict.minds import KEPT, LEARNT, NOT_KEPT, Minds
+from gateway.predict.spread import Spread
+from gateway.predict.states import State
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+PRIOR = 3.0  # horizons' worth of predictions that were as far off as they should be
+MEMORY = 20.0  # horizons after which what was learnt has faded to a third
+AT_MOST = 4.0  # sigmas: one prediction that is off by more counts no more
+USUAL = 0.7978  # the mean size of a Gaussian's values of sigma 1 that count at most so much
+LEAST, MOST = 1.0 / 3.0, 3.0  # scales
+LEAST_SIGMA_M = 0.01
+FRESH_S = 2.0  # a track without a measurement for longer does not know where it is
+MOVING_MPS = 3.0  # slower, there is no course that a prediction could be off along or across
+
+
+def learnt(minds: Minds, at: int, state: State, horizons_s: tuple[float, ...]) -> Minds:
+    """The same with what comes due at an instant, of tracks in such states, held against where they are."""
+    due_at = minds.due_at
+    late_s = (at - due_at) / SECOND
+    due = (late_s >= 0.0) & (late_s < 1.0) & (state.since_s <= FRESH_S)[:, None, None]
+    late_s = np.where(due, late_s, 0.0)[..., None]
+    off = state.position[:, None, None] - late_s * state.velocity[:, None, None] - minds.foretold[..., 0:2]
+    cosine, sine = np.cos(minds.foretold[..., 2]), np.sin(minds.foretold[..., 2])
+    along = np.abs(off[..., 0] * cosine + off[..., 1] * sine) / np.maximum(minds.foretold[..., 3], LEAST_SIGMA_M)
+    across = np.abs(off[..., 1] * cosine - off[..., 0] * sine) / np.maximum(minds.foretold[..., 4], LEAST_SIGMA_M)
+    sigmas = np.minimum(np.where(due[..., None], np.stack([along, across], axis=-1), 0.0), AT_MOST)
+    worth = np.array([_every(horizon) / horizon for horizon in horizons_s[:LEARNT]])
+    worth = np.concatenate([worth, np.zeros(LEARNT - len(worth))])
+    told, weight = [], []
+    for turns in (0.0, 1.0):
+        these = due & (minds.foretold[..., 5] == turns)
+        told.append((sigmas * these[..., None]).sum(axis=2) * worth[:, None])
+        weight.append(these.sum(axis=2) * worth)
+    counted = np.stack(weight, axis=1)
+    keep = np.exp(-counted / MEMORY)
+    return replace(
+        minds,
+        due_at=np.where(due, NOT_KEPT, due_at),
+        sigmas=minds.sigmas * keep[..., None] + np.stack(told, axis=1),
+        counted=minds.counted * keep + counted,
+    )
+
+
+def scaled(minds: Minds, spread: Spread, turns: Bools) -> Spread:
+    """Sigmas (n, h) as the tracks' own past says they are; `turns` (n, h) where the way or the aircraft turns."""
+    scale = (PRIOR * USUAL + minds.sigmas) / (PRIOR + minds.counted[..., None]) / USUAL
+    scale = np.clip(scale, LEAST, MOST)  # (n, 2, LEARNT, 2)
+    slots = np.minimum(np.arange(turns.shape[1]), LEARNT - 1)
+    each = np.where(turns[..., None], scale[:, 1][:, slots], scale[:, 0][:, slots])
+    return Spread(spread.along * each[..., 0], spread.across * each[..., 1])
+
+
+def kept(
+    minds: Minds,
+    at: int,
+    horizons_s: tuple[float, ...],
+    mean: Floats,
+    course: Floats,
+    spread: Spread,
+    turns: Bools,
+    moves: Bools,
+) -> Minds:
+    """The same with what is foretold at an instant: places (n, h, 2), courses, sigmas before they are scaled.
+
+    `moves` (n,) who moves fast enough to be held to it.
+    """
+    due_at, foretold = minds.due_at, minds.foretold
+    second = at // SECOND
+    now = [place for place, one in enumerate(horizons_s[:LEARNT]) if second % _every(one) == 0]
+    if not now:
+        return minds
+    due_at, foretold = due_at.copy(), foretold.copy()
+    for place in now:
+        slot = second // _every(horizons_s[place]) % KEPT
+        due_at[:, place, slot] = np.where(moves, at + int(horizons_s[place] * SECOND), NOT_KEPT)
+        columns = (
+            mean[:, place, 0],
+            mean[:, place, 1],
+            course[:, place],
+            spread.along[:, place],
+            spread.across[:, place],
+        )
+        foretold[:, place, slot] = np.stack([*columns, turns[:, place].astype(np.float64)], axis=-1)
+    return replace(minds, due_at=due_at, foretold=foretold)
+
+
+def _every(horizon_s: float) -> int:
+    """How many seconds lie between those that are kept: so many that the first comes due before the last place is taken."""
+    return max(math.ceil(horizon_s / (KEPT - 1)), 1)
