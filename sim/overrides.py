@@ -52,7 +52,13 @@ _ANY_SIGN = (
     "time_error_s",
     "abeam_deg",
 )
-_COUNTS = {"aircraft": (0, LARGEST_SYSTEM), "radars": (0, 20), "first_number": (1, 60_000), "birds": (0, 1000)}
+_COUNTS = {
+    "aircraft": (0, LARGEST_SYSTEM),
+    "radars": (0, 20),
+    "first_number": (1, 60_000),
+    "birds": (0, 1000),
+    "burst_plots": (0, 100_000),
+}
 
 
 def override(parameters: SceneParameters, changes: Iterable[str]) -> SceneParameters:

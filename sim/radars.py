@@ -134,7 +134,7 @@ def _plots_of_scans(scene: Scene, radar: SceneRadar, scans: Floats) -> list[list
         for place in np.flatnonzero(measured.seen):
             plots[there[place]].append((number, measured.polar[place], float(measured.radial_mps[place])))
     clutter, birds, rain = (stream(scene.seed, radar.name, name) for name in ("clutter", "birds", "rain"))
-    strewn = [draw_clutter(radar.parameters, len(scans), clutter)]
+    strewn = [draw_clutter(radar.parameters, scans, clutter)]
     strewn += [draw_birds(radar.parameters, scans, birds), draw_rain(radar.parameters, scans, rain)]
     for which, polar in strewn:
         for scan, false_plot in zip(which.tolist(), polar, strict=True):

@@ -70,6 +70,8 @@ class RadarParameters:
     numbered: bool = True  # False: every plot has track number 0
     first_number: int = 1  # of the first aircraft; the next ones follow
     clutter_per_scan: float = 0.0  # mean of a Poisson number, uniform over the coverage up to 10 degrees
+    bursts: Intervals = ()  # while a jammer, or a fault, makes of every scan
+    burst_plots: int = 10_000  # so many false plots more
     birds: int = 0  # about the approach, each on its own way
     rain_per_scan: float = 0.0  # mean of a Poisson number of plots of a shower that drifts over the approach
     dropouts: Intervals = ()
@@ -199,11 +201,12 @@ def measure_radar(
 
 
 def draw_clutter(
-    parameters: RadarParameters, scans: int, generator: np.random.Generator
+    parameters: RadarParameters, time_s: Floats, generator: np.random.Generator
 ) -> tuple[NDArray[np.int64], Floats]:
-    """False plots, uniform over the coverage: the scan of each (m,), and range, azimuth, elevation (m, 3)."""
-    per_scan = generator.poisson(parameters.clutter_per_scan, scans)
-    scan = np.repeat(np.arange(scans), per_scan)
+    """False plots of scans, uniform over the coverage: the scan of each (m,), and range, azimuth, elevation (m, 3)."""
+    per_scan = generator.poisson(parameters.clutter_per_scan, len(time_s))
+    per_scan[during(parameters.bursts, time_s)] += parameters.burst_plots
+    scan = np.repeat(np.arange(len(time_s)), per_scan)
     drawn = generator.uniform(size=(len(scan), 3))
     low = np.array([500.0, -parameters.sector_rad, 0.0])
     high = np.array([parameters.maximum_range_m, parameters.sector_rad, math.radians(10.0)])

@@ -172,10 +172,17 @@ def test_radial_velocity_is_negative_for_an_approaching_target() -> None:
     assert np.isnan(silent).all()
 
 
+def test_a_burst_is_in_the_scans_of_its_time() -> None:
+    """From 4 s to 4.8 s every scan has so many false plots more; the others have none."""
+    parameters = RadarParameters(bursts=((4.0, 4.8),), burst_plots=300)
+    scan, _ = draw_clutter(parameters, 0.4 * np.arange(20), stream(0, "clutter"))
+    assert np.bincount(scan, minlength=20).tolist() == [0] * 10 + [300] * 2 + [0] * 8
+
+
 def test_clutter_fills_the_coverage() -> None:
     """The number of false plots is Poisson, and they are uniform over range, sector and the lowest 10 degrees."""
     parameters = RadarParameters(clutter_per_scan=5.0, sector_rad=0.5)
-    scan, polar = draw_clutter(parameters, 2000, stream(0, "clutter"))
+    scan, polar = draw_clutter(parameters, 0.4 * np.arange(2000), stream(0, "clutter"))
     per_scan = np.bincount(scan, minlength=2000)
     assert np.mean(per_scan) == pytest.approx(5.0, abs=4 * math.sqrt(5.0 / 2000))
     assert np.var(per_scan) == pytest.approx(5.0, abs=1.0)

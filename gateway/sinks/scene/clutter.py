@@ -69,7 +69,8 @@ class ClutterScene:
     def _looks(self, radar: int) -> list[Entry]:
         """How they look at all times."""
         colour = style.radar_colour(radar)
-        told = rr.Points3D.from_fields(colors=style.FUSED, radii=style.points(5.0), show_labels=True)
+        # A fused track stands at the same place, with a label of its own: these are shown when pointed at.
+        told = rr.Points3D.from_fields(colors=style.FUSED, radii=style.points(5.0), show_labels=False)
         return [
             Always(_path(radar, "hypotheses"), (rr.Points3D.from_fields(radii=style.points(2.5)),)),
             Always(_path(radar, "confirmed"), (told,)),
