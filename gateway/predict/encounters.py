@@ -130,6 +130,7 @@ class _Met:
     after_s: Floats  # and how long after it
     loses_s: Floats
     ratio: Floats
+    rank: Floats  # the least is the nearest instant
 
 
 def _met(
@@ -162,33 +163,25 @@ def _met(
     )
     after_s = np.maximum(after_s, -times_s[grid][:, None])
     then = way[:, None] + after_s[..., None] * drift[:, None]
-    ratio = np.maximum(
-        np.sqrt(then[..., 0] ** 2 + then[..., 1] ** 2) / separation.horizontal_m,
-        np.abs(then[..., 2]) / separation.vertical_m,
-    )
-    best = ratio.argmin(axis=1)
+    level_share = np.sqrt(then[..., 0] ** 2 + then[..., 1] ** 2) / separation.horizontal_m
+    ratio = np.maximum(level_share, np.abs(then[..., 2]) / separation.vertical_m)
+    rank = np.where(ratio < 1.0, level_share, 1.0 + ratio)  # of those that lose separation, where they pass each other
+    best = rank.argmin(axis=1)
     rows = np.arange(len(way))
     lost_s = np.where(ratio < 1.0, times_s[grid][:, None] + after_s, math.inf).min(axis=1, initial=math.inf)
-    return _one_each(_Met(first, second, grid, after_s[rows, best], lost_s, ratio[rows, best]))
+    return _one_each(_Met(first, second, grid, after_s[rows, best], lost_s, ratio[rows, best], rank[rows, best]))
 
 
 def _one_each(met: _Met) -> _Met:
     """The nearest instant of each pair, and the first at which it loses separation; pairs no nearer than wanted are left out."""
-    order = np.lexsort((met.grid, met.ratio, met.second, met.first))
+    order = np.lexsort((met.grid, met.rank, met.second, met.first))
     first, second = met.first[order], met.second[order]
     begins = np.flatnonzero(np.append(True, (first[1:] != first[:-1]) | (second[1:] != second[:-1]))[: len(order)])
     loses_s = np.minimum.reduceat(met.loses_s[order], begins) if len(begins) else met.loses_s
     one = order[begins]
     chosen = _Met(*(getattr(met, part.name)[one] for part in fields(met)))
     near = chosen.ratio < WIDER
-    return _Met(
-        chosen.first[near],
-        chosen.second[near],
-        chosen.grid[near],
-        chosen.after_s[near],
-        loses_s[near],
-        chosen.ratio[near],
-    )
+    return _Met(*((loses_s if one.name == "loses_s" else getattr(chosen, one.name))[near] for one in fields(met)))
 
 
 def _same(ways: Ways, place: Floats, velocity: Floats, first: Ints, second: Ints) -> Bools:
