@@ -149,7 +149,7 @@ class DeclaringPort:
             return _answer(False, why)
         lines.append(line)
         told = sentence(said)
-        return _answer(True, f"{told[0].upper()}{told[1:]}." if told.startswith("w") else f"{told}.")
+        return _answer(True, f"{told}.")
 
 
 def _bound(port: int | None) -> socket.socket:
