@@ -70,7 +70,7 @@ class Making:
         jobs, self.jobs = list(self.jobs.values()), {}
         separation_m = self.geoid.separation_m
         self.lanes, rows, fresh = fuse.work(self.lanes, jobs, self._spans, separation_m, self.model)
-        self.rows += rows
+        self.rows += self._with_wind(rows)
         self.consistency = self.consistency.hearing(fresh)
         outliers = sum(event.outlying for _, event in fresh)
         if outliers:
@@ -79,6 +79,23 @@ class Making:
             if event.restarted is not None:
                 self.count("restarted after divergence")
                 self.events.append(Event(event.at, "warning", f"track {number} started again: {event.restarted}"))
+
+    def _with_wind(self, rows: list[Row]) -> list[Row]:
+        """Rows with the winds that dead reckoning has found; what it knows changes only where nothing waits."""
+        if not self.reckoners.by_aircraft:
+            return rows
+        return [replace(row, wind_mps=self.reckoners.wind_mps(row.aircraft)) for row in rows]
+
+    def _with_reckoning(self, health: Health) -> Health:
+        """What vehicles say, with what dead reckoning has found of them."""
+        if not self.reckoners.by_aircraft:
+            return health
+        vehicles = []
+        for one in health.vehicles:
+            found = self.reckoners.of(one.aircraft, self.now or 0)
+            readings, words = found.shown() if found is not None else ((), ())
+            vehicles.append(replace(one, readings=(*one.readings, *readings), words=(*one.words, *words)))
+        return replace(health, vehicles=tuple(vehicles))
 
     def _scene(self) -> Scene:
         return Scene(self.tracks, self._spans, self.options)
@@ -153,7 +170,7 @@ class Making:
             fuse=replace(table, settled=tuple(self.settled)),
             predict=predict.table(self.forecasts, self.frame, self.rounds),
             truth=tuple(observation for observation in observations if isinstance(observation, Truth)),
-            health=replace(health, sources=(*health.sources, own)),
+            health=replace(self._with_reckoning(health), sources=(*health.sources, own)),
             events=tuple(self.events),
             reckoned=tuple(self.reckoned),
         )

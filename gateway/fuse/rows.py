@@ -53,6 +53,7 @@ class Fused:
     pressure_altitude_m: Floats  # as last reported; NaN = not in the last seconds
     callsign: tuple[str | None, ...]
     life: tuple[str, ...]  # "tentative", "confirmed", "coasting"
+    wind_mps: Floats  # (n, 2) east, north: where the air moves to, as dead reckoning has found; NaN = it has not
     ended: tuple[Ended, ...] = ()
     lived: tuple[LifeChange, ...] = ()  # which began, were confirmed, or coast, and why
     settled: tuple[Settled, ...] = ()  # states that nothing can change any more
@@ -75,6 +76,10 @@ class Row:
     event: Event  # what the row was made of
     modes: Floats  # (3,) straight, left, right; NaN = the estimator has none
     life: str
+    wind_mps: tuple[float, float] = (
+        math.nan,
+        math.nan,
+    )  # east, north: where the air moves to, as found by dead reckoning
 
 
 def row_of(lane: Lane, event: Event, spans: Spans, separation_m: float, model: Model) -> Row:
@@ -192,6 +197,7 @@ def table(
         pressure_altitude_m=np.array([_pressure_altitude_m(row) for row in rows]).reshape(n),
         callsign=tuple(row.event.callsign for row in rows),
         life=tuple(row.life for row in rows),
+        wind_mps=np.array([row.wind_mps for row in rows]).reshape(n, 2),
         ended=tuple(ended),
         lived=tuple(lived),
     )

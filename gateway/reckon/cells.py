@@ -74,7 +74,7 @@ def first_covered(told: Told, after: int) -> int:
 def cells(told: Told, first: int, end: int) -> Cells:
     """What was told in the cells from `first` up to `end`, which the unit's samples must cover."""
     inertial, n = told.inertial, end - first
-    means = _means(inertial, first, n)
+    means = _means(inertial, first - 1, n + 1)
     attitude, rate, is_told = _attitudes(told, means[:, 3:6], first, n)
     unseen = _unseen(inertial, first, n)
     unseen[is_told, 3:] = 0.0
@@ -84,7 +84,7 @@ def cells(told: Told, first: int, end: int) -> Cells:
     return Cells(
         first,
         rate,
-        means[:, :3],
+        means[1:, :3],
         unseen,
         is_told,
         attitude,
@@ -100,16 +100,17 @@ def cells(told: Told, first: int, end: int) -> Cells:
 def _attitudes(told: Told, gyro_radps: Floats, first: int, n: int) -> tuple[Floats, Floats, Bools]:
     """The autopilot's attitude at the ends of cells (n, 4), the rates (n, 3) of cells, and whether these are its own.
 
+    `gyro_radps`: of these cells and the one before (n + 1, 3).
+
     Where it tells its attitude in one cell and in the one before, it has turned by what is between them: it has seen all
     samples of its gyro, and of those few are told.
     """
     attitude, late_s = _last(told.series[ATTITUDE], first - 1, n + 1)
-    before = np.concatenate([gyro_radps[:1], gyro_radps])
-    attitude = product(attitude, turned_by(before * np.nan_to_num(late_s)[:, None]))
+    attitude = product(attitude, turned_by(gyro_radps * np.nan_to_num(late_s)[:, None]))
     turned = product(attitude[:-1] * [1.0, -1.0, -1.0, -1.0], attitude[1:])
     rate = 2.0 / CELL_S * turned[:, 1:] * np.where(turned[:, :1] < 0.0, -1.0, 1.0)
     is_told = ~np.isnan(rate[:, 0])
-    return attitude[1:], np.where(is_told[:, None], rate, gyro_radps), is_told
+    return attitude[1:], np.where(is_told[:, None], rate, gyro_radps[1:]), is_told
 
 
 def _means(inertial: Series, first: int, n: int) -> Floats:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gateway.estimators import dead_reckoning as dr
 from gateway.estimators.inertial import displaced
 from gateway.observation import Observation
-from gateway.reckon.cells import BLOCK, CELL_NS, GAP_NS, SECOND_CELLS, Cells, cells, covered_until, first_covered
+from gateway.reckon.cells import BLOCK, CELL_NS, SECOND_CELLS, Cells, cells, covered_until, first_covered
 from gateway.reckon.judging import TRUSTED_AFTER, WANDERS_M
 from gateway.reckon.running import Kinds, begun, run
 from gateway.reckon.tip import NOTHING, Tip
@@ -32,7 +32,7 @@ VEHICLES_AT_MOST = 200
 TYPES_AT_MOST = 10_000  # a bound on what strangers can make us remember
 NEAR_ATTITUDE_NS = 500_000_000
 MARGIN_NS = 2 * SECOND  # what is told is kept so much longer than tips
-SILENT_NS = 2 * SECOND  # an inertial unit that says nothing for so long: nobody knows how the vehicle moves
+SILENT_NS = 3 * SECOND  # an inertial unit that says nothing for so long: nobody knows how the vehicle moves
 AHEAD_NS = 3 * SECOND  # a state is carried on so far at most
 JERKED_MPS2 = 3.0  # and by then the acceleration may be another by this
 WIND_KNOWN_MPS = 3.0  # a wind that is less sure than this is not told
@@ -64,6 +64,16 @@ class Reckoned:
     def level_sigma_m(self) -> float:
         """An axis."""
         return math.sqrt(0.5 * float(self.sigma_m[0] ** 2 + self.sigma_m[1] ** 2))
+
+    def shown(self) -> tuple[tuple[tuple[str, float], ...], tuple[tuple[str, str], ...]]:
+        """What people are shown of it: readings with their units, and words."""
+        readings = [("dead reckoning sigma, m", self.level_sigma_m)]
+        if not math.isnan(self.wind_mps[0]):
+            north, east = self.wind_mps.tolist()
+            readings.append(("wind found, m/s", math.hypot(north, east)))
+            readings.append(("wind found from, degrees", math.degrees(math.atan2(-east, -north)) % 360.0))
+        denied = ("believed", "refused: they jumped", "refused: they walk off")[self.denied]
+        return tuple(readings), (("positions", denied),)
 
     @property
     def wanders_m(self) -> float:
@@ -195,6 +205,14 @@ class Reckoners:
         before = next((one for one in reversed(reckoner.tips) if int(one.cell[0]) * CELL_NS <= at), reckoner.tips[0])
         return replace(_reckoned(aircraft, before, at), denied=self.denied(aircraft))
 
+    def wind_mps(self, aircraft: str | None) -> tuple[float, float]:
+        """The wind that a vehicle has found, east and north, where the air moves to; NaN = it has not."""
+        reckoner = self.by_aircraft.get(aircraft or "")
+        if reckoner is None or reckoner.tip is None:
+            return math.nan, math.nan
+        north, east = _wind_mps(reckoner.tip).tolist()
+        return east, north
+
     def pictured(self, aircraft: str, at: int, place: tuple[float, ...]) -> Reckoners:
         """The same with where radars had a vehicle, as `told.PLACE`; it counts from the next second on."""
         known = self.by_aircraft[aircraft]
@@ -238,11 +256,8 @@ def _begun_or_kept(one: Reckoner, since: int, at: int, settings: DeadReckoning) 
     """A vehicle's tips as far as they still hold; the first one, where dead reckoning can begin."""
     tips = _untouched(one.tips, since)
     if tips:
-        inertial = one.told.inertial.at
         end = covered_until(one.told, int(tips[-1].cell[0]))
-        # A gap that new samples come after, or that has lasted for long.
-        is_broken = not len(inertial) or inertial[-1] - end * CELL_NS > GAP_NS + 2 * CELL_NS
-        if is_broken or at - end * CELL_NS > SILENT_NS + SECOND:
+        if at - end * CELL_NS > SILENT_NS:  # for so long what is missing may still come
             tips = ()
     if not tips:
         first = _first(one.told, settings)
@@ -292,8 +307,6 @@ def _reckoned(aircraft: str, tip: Tip, at: int) -> Reckoned:
     )
     variance = np.diagonal(tip.state.covariance[0, 0])
     jerked = JERKED_MPS2 * ahead_s
-    wind = tip.state.wind_mps[0, 0]
-    is_known = variance[dr.WIND].max() < WIND_KNOWN_MPS**2
     return Reckoned(
         aircraft,
         at,
@@ -303,10 +316,16 @@ def _reckoned(aircraft: str, tip: Tip, at: int) -> Reckoned:
         velocity,
         np.sqrt(variance[:3] + variance[3:6] * ahead_s**2 + (0.5 * jerked * ahead_s) ** 2),
         np.sqrt(variance[3:6] + jerked**2),
-        wind if is_known else np.full(2, math.nan),
+        _wind_mps(tip),
         math.sqrt(float(tip.scatter_m2[0])),
         int(tip.denied[0]),
         int(tip.heard[0]) * CELL_NS,
         bool(tip.cell[0] - tip.began[0] >= TRUSTED_AFTER),
         ahead_s,
     )
+
+
+def _wind_mps(tip: Tip) -> Floats:
+    """North and east (2,); NaN = not known."""
+    is_known = tip.state.covariance[0, 0, dr.WIND, dr.WIND].max() < WIND_KNOWN_MPS**2
+    return tip.state.wind_mps[0, 0] if is_known else np.full(2, math.nan)

@@ -51,6 +51,8 @@ TRACKS = pa.schema(
         ("pressure_altitude_m", _REAL),  # never a height: it stands beside one, or where there is none
         ("callsign", _TEXT),
         ("life", _TEXT),
+        ("wind_east_mps", _REAL),  # where the air moves to, as dead reckoning has found it
+        ("wind_north_mps", _REAL),
     ]
 )
 
@@ -131,6 +133,7 @@ def tracks_batch(parts: Sequence[Fused]) -> pa.RecordBatch:
         _real(np.concatenate([part.pressure_altitude_m for part in parts])),
         _text([part.callsign for part in parts]),
         _text([part.life for part in parts]),
+        *(_real(np.concatenate([part.wind_mps for part in parts])[:, axis]) for axis in range(2)),
     ]
     return pa.RecordBatch.from_arrays(columns, schema=TRACKS)
 

@@ -56,8 +56,11 @@ def _picture_page(site: Site, modes: bool) -> rrb.Horizontal:
             rrb.Tabs(
                 _plot(f"Biases, {units.length}", ["/register/gps/**", "/register/error/range/**"]),
                 *([_plot("Modes", ["/fuse/modes/**"])] if modes else []),
-                _plot(f"Speed, {units.speed}", ["/fuse/**", "- /fuse/modes/**", "- /fuse/sigma/**"]),
+                _plot(
+                    f"Speed, {units.speed}", ["/fuse/**", "- /fuse/modes/**", "- /fuse/sigma/**", "- /fuse/reckoned/**"]
+                ),
                 _plot(f"Sigma, {units.length}", ["/fuse/sigma/**", "/track/radars/**"]),
+                _plot("Without GPS, m", ["/fuse/reckoned/**"]),
                 _plot("Association", ["/associate/**"]),
                 _plot("Lateness, s", ["/align/**"]),
             ),

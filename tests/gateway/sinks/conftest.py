@@ -101,6 +101,7 @@ class _Maker:
             pressure_altitude_m=np.full(n, np.nan),
             callsign=none,
             life=("coasting" if state == "coasting" else "confirmed",) * n,
+            wind_mps=np.full((n, 2), np.nan),
         )
 
     def predicted(self, time_s: float, track: int) -> Predicted:

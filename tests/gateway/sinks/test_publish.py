@@ -62,6 +62,7 @@ def fused(rows: Sequence[dict[str, Any]], ended: Sequence[int] = ()) -> Fused:
         "modes": np.zeros((n, 3)),
         "runway_m": np.zeros((n, 3)),
         "bias_m": np.zeros((n, 3)),
+        "wind_mps": np.full((n, 2), math.nan),
     }
     return Fused(**made, **nothing, ended=tuple(Ended(START, track, "no data for 30 s") for track in ended))
 

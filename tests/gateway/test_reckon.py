@@ -1,0 +1,250 @@
+"""Dead reckoning live: what vehicles tell of their motion carries them on, and denies positions that are false."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from gateway.observation import Heard, ImuSample, Many
+from gateway.picture import Picture
+from gateway.pipeline import State, initial, step
+from gateway.reckon.told import Series, portioned
+from gateway.settings import DeadReckoning, Options, Runway, Site
+from sim.inertial import aeroplane, car
+from sim.told_rides import Falsified, Teller, heard, honest
+
+SECOND = 1_000_000_000
+START = 1_700_000_000 * SECOND
+SITE = Site("here", Runway(math.radians(47.4), math.radians(8.5), 500.0, 0.0, geoid_separation_m=0.0))
+FALSE_FROM_S = 45.0
+
+
+def walks_off(time_s: float) -> tuple[float, float, float, float]:
+    """2 m/s to the north-east, which its velocities say too."""
+    gone_s = max(time_s - FALSE_FROM_S, 0.0)
+    speed = math.sqrt(2.0) if gone_s else 0.0
+    return speed * gone_s, speed * gone_s, speed, speed
+
+
+def walks_off_silently(time_s: float) -> tuple[float, float, float, float]:
+    """The same, and its velocities say nothing of it."""
+    return (*walks_off(time_s)[:2], 0.0, 0.0)
+
+
+def jumps(time_s: float) -> tuple[float, float, float, float]:
+    """50 m to the side for twenty seconds."""
+    return (30.0, 40.0, 0.0, 0.0) if FALSE_FROM_S < time_s <= FALSE_FROM_S + 20.0 else (0.0, 0.0, 0.0, 0.0)
+
+
+def goes_away(time_s: float) -> tuple[float, float, float, float] | None:
+    """Nothing for twenty seconds."""
+    return None if FALSE_FROM_S < time_s <= FALSE_FROM_S + 20.0 else (0.0, 0.0, 0.0, 0.0)
+
+
+@cache
+def told(kind: str, falsified: Falsified, length_s: float = 75.0) -> tuple[Teller, tuple[Heard, ...]]:
+    generator = np.random.default_rng([7, kind == "car"])
+    make, vehicle_type = (car, 10) if kind == "car" else (aeroplane, 1)
+    teller = Teller.of("mavlink:1", vehicle_type, make(generator, length_s), generator, falsified)
+    return teller, tuple(heard([teller], START, 5))
+
+
+def pictures(
+    said: Iterable[Heard], at_once: int = 10, options: Options = Options(), site: Site = SITE
+) -> Iterator[tuple[State, Picture]]:
+    state, waiting = initial(site, options), list[Heard]()
+    for one in said:
+        waiting.append(one)
+        if len(waiting) == at_once:
+            state, picture = step(state, waiting)
+            waiting = []
+            yield state, picture
+
+
+@cache
+def ran(kind: str, falsified: Falsified, dead_reckoning: Literal["on", "off"] = "on") -> tuple[Picture, ...]:
+    """A ride, seen through to its end."""
+    options = Options(dead_reckoning=dead_reckoning, horizons_s=(10.0,))
+    return tuple(picture for _, picture in pictures(told(kind, falsified)[1], options=options))
+
+
+def denials(some: Iterable[Picture]) -> list[tuple[float, str]]:
+    """When positions were denied, or believed again, s since they are false."""
+    found = []
+    for picture in some:
+        for event in picture.events:
+            if "what it says of its position" in event.text:
+                word = "believed" if "agrees again" in event.text else "denied"
+                found.append(((event.at - START) / SECOND - FALSE_FROM_S, word))
+    return found
+
+
+def refused(some: Sequence[Picture]) -> int:
+    (gateway,) = (one for one in some[-1].health.sources if one.kind == "pipeline")
+    return dict(gateway.counters).get("GPS reports that inertial data deny", 0)
+
+
+def errors_m(teller: Teller, some: Iterable[Picture]) -> list[tuple[float, str, float, float]]:
+    """Of each row: when, what it is by, how far it is from the truth, level, and its own sigma."""
+    motion, found = teller.ride.motion, []
+    for picture in some:
+        fuse = picture.fuse
+        for row, time in enumerate(fuse.time.tolist()):
+            time_s = (time - START) / SECOND
+            place = min(round(time_s * 50.0), len(motion.height_m) - 1)
+            north = (fuse.latitude_rad[row] - motion.latitude_rad[place]) * 6.367e6
+            east = (
+                (fuse.longitude_rad[row] - motion.longitude_rad[place]) * 6.388e6 * math.cos(motion.latitude_rad[place])
+            )
+            sigma = math.sqrt(0.5 * (fuse.covariance[row, 0] + fuse.covariance[row, 7]))
+            found.append((time_s - FALSE_FROM_S, fuse.updated_by[row], math.hypot(north, east), sigma))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("kind", "falsified", "within_s"),
+    [("car", walks_off, 20.0), ("aeroplane", walks_off_silently, 20.0), ("aeroplane", jumps, 2.0)],
+)
+def test_what_walks_off_at_2_m_s_is_refused_within_20_s_and_a_step_of_50_m_is_told_within_two(
+    kind: str, falsified: Falsified, within_s: float
+) -> None:
+    since_s, word = denials(ran(kind, falsified))[0]
+    assert word == "denied"
+    assert 0.0 < since_s <= within_s
+
+
+def test_no_position_after_a_step_of_50_m_reaches_the_track() -> None:
+    teller, _ = told("aeroplane", jumps)
+    rows = errors_m(teller, ran("aeroplane", jumps))
+    assert max(off for since_s, _, off, _ in rows if since_s > -20.0) < 15.0
+    assert refused(ran("aeroplane", jumps)) >= 40
+
+
+def test_what_agrees_again_is_believed_again() -> None:
+    (_, first), (since_s, second) = denials(ran("aeroplane", jumps))
+    assert (first, second) == ("denied", "believed")
+    assert 20.0 < since_s < 28.0
+
+
+def test_of_good_positions_none_is_refused_and_none_is_changed() -> None:
+    on, off = ran("aeroplane", honest), ran("aeroplane", honest, "off")
+    assert refused(on) == 0
+    assert [one.fuse.covariance.tobytes() for one in on] == [one.fuse.covariance.tobytes() for one in off]
+    assert [one.fuse.runway_m.tobytes() for one in on] == [one.fuse.runway_m.tobytes() for one in off]
+
+
+def test_without_positions_the_track_goes_on_by_dead_reckoning_and_says_how_sure_it_is() -> None:
+    teller, _ = told("aeroplane", goes_away)
+    whole = errors_m(teller, ran("aeroplane", goes_away))
+    rows = [row for row in whole if row[1] == "dead-reckoning"]
+    assert 16 <= len(rows) <= 19
+    assert max(off for _, _, off, _ in rows) < 15.0
+    assert all(b[3] > a[3] for a, b in pairwise(rows[2:]))
+    assert not [row for row in whole if row[1] == "coast"]
+    off = errors_m(teller, ran("aeroplane", goes_away, "off"))
+    assert {row[1] for row in off if 3.0 < row[0] <= 20.0} == {"coast"}
+
+
+def test_positions_that_come_back_make_no_jump() -> None:
+    teller, _ = told("aeroplane", goes_away)
+    rows = sorted(errors_m(teller, ran("aeroplane", goes_away)))
+    steps = [(abs(b[2] - a[2]), b[0] - a[0]) for a, b in pairwise(rows) if 19.0 < a[0] < 28.0]
+    assert max(change / max(passed_s, 0.2) for change, passed_s in steps) < 8.0
+
+
+def test_a_wind_is_found_and_written_beside_the_track() -> None:
+    teller, _ = told("aeroplane", honest)
+    east, north = ran("aeroplane", honest)[-1].fuse.wind_mps[-1]
+    assert math.hypot(north - teller.ride.wind_mps[-1, 0], east - teller.ride.wind_mps[-1, 1]) < 2.5
+
+
+def split(said: Iterable[Heard]) -> Iterator[Heard]:
+    """What came together comes one by one, and inertial samples as objects."""
+    for one in said:
+        for observation in one.observations:
+            alone = tuple(observation) if isinstance(observation, Many) else (observation,)
+            yield from (replace(one, observations=(each,)) for each in alone)
+
+
+def test_how_arrivals_fall_into_steps_changes_no_bit() -> None:
+    said = tuple(one for one in told("aeroplane", goes_away)[1] if one.now < START + 50 * SECOND)
+    end = Heard(START + 51 * SECOND)
+
+    def rows(some: Iterable[Heard], at_once: int) -> bytes:
+        made = [picture.fuse for _, picture in pictures(some, at_once)]
+        return b"".join(np.concatenate([getattr(one, name) for one in made]).tobytes() for name in _COLUMNS)
+
+    parts = [*split(said), end]
+    assert rows([*parts, *[end] * (-len(parts) % 37)], 37) == rows([*said, end], len(said) + 1)
+
+
+_COLUMNS = ("time", "latitude_rad", "longitude_rad", "height_m", "velocity_mps", "covariance", "wind_mps")
+
+
+def test_what_is_told_late_goes_back_to_its_place() -> None:
+    """Two seconds of inertial samples that come 1.5 s late leave the same state as samples that came in time."""
+    _, said = told("car", honest, 40.0)
+    late = []
+    for one in said:
+        samples = tuple(each for each in one.observations if isinstance(each, Many))
+        if START + 30 * SECOND < one.now < START + 32 * SECOND:
+            others = tuple(each for each in one.observations if not isinstance(each, Many))
+            late.append((one.now, replace(one, observations=others)))
+            later = one.now + 1_500_000_000
+            moved = tuple(
+                Many(ImuSample, {**each.columns, "received_at": each.columns["received_at"] + 1_500_000_000})
+                for each in samples
+            )
+            late.append((later, Heard(later, moved)))
+        else:
+            late.append((one.now, one))
+    late.sort(key=lambda pair: pair[0])
+    *_, (in_time, _) = pictures(said, len(said))
+    *_, (behind, _) = pictures([one for _, one in late], len(late))
+    a, b = (state.reckoners.of("mavlink:1", START + 39 * SECOND) for state in (in_time, behind))
+    assert a is not None
+    assert b is not None
+    assert a.latitude_rad == pytest.approx(b.latitude_rad, abs=1e-14)
+    assert a.velocity_mps == pytest.approx(b.velocity_mps, abs=1e-9)
+
+
+def test_series_are_the_same_whatever_came_first() -> None:
+    generator = np.random.default_rng(1)
+    at, values = generator.integers(0, 30, 40), generator.standard_normal((40, 2))
+    once = Series.empty(2).with_more(Series(at, values))
+    order = generator.permutation(40)
+    parts = Series.empty(2)
+    for place in order:
+        parts = parts.with_more(Series(at[place : place + 1], values[place : place + 1]))
+    assert once.at.tolist() == parts.at.tolist()
+    assert once.values.tolist() == parts.values.tolist()
+
+
+def test_what_was_received_at_an_instant_or_later_waits_for_the_next() -> None:
+    _, said = told("car", honest, 40.0)
+    samples = [each for one in said[:3] for each in one.observations if isinstance(each, Many)]
+    until = int(samples[1].columns["received_at"][0])
+    portion, later = portioned(samples, until)
+    assert len(portion["mavlink:1"][0].at) == 5
+    assert sum(len(one) for one in later if isinstance(one, Many)) == 10
+
+
+def test_a_vehicle_without_an_inertial_unit_is_nothing_to_dead_reckoning() -> None:
+    _, said = told("aeroplane", goes_away)
+    plain = [replace(one, observations=tuple(o for o in one.observations if not isinstance(o, Many))) for one in said]
+    *_, (state, _) = pictures(plain[:200])
+    assert not state.reckoners.by_aircraft
+    assert sum(len(some) for _, some in state.reckoners.waiting) < 40
+
+
+def test_a_site_may_let_everything_pass() -> None:
+    site = replace(SITE, dead_reckoning=DeadReckoning(refuses=False))
+    *_, (state, _) = pictures(told("aeroplane", jumps)[1][:480], site=site)
+    assert "GPS reports that inertial data deny" not in state.counters
