@@ -50,7 +50,8 @@ class Tracking(Arriving):
     def _say_crowded(self, radar: int) -> None:
         self.once(
             f"radar {radar} sends more plots without a number at once than can all be followed: the likeliest are, and "
-            f"confirmed tracks before all others"
+            f"confirmed tracks before all others; hypotheses_at_most = {self.radars[radar].hypotheses_at_most} in its "
+            f"[[radar]] bounds their number, and the time that a scan takes"
         )
 
     def due_tracks(self) -> tuple[Tracked, Tracked]:

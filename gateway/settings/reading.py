@@ -205,6 +205,7 @@ _TABLES: dict[str, _Table] = {
             "clutter_per_scan": ("clutter_per_scan", _number(0.0, 1e5)),
             "detection_probability": ("detection_probability", _number(0.05, 0.999)),
             "slowest_mps": ("slowest_mps", _number(0.0, 300.0)),
+            "hypotheses_at_most": ("hypotheses_at_most", _whole(10, 100_000)),
         },
         required=("number", "along_m", "left_m", "antenna_height_m"),
         many=True,

@@ -11,6 +11,7 @@ from gateway.settings.safety import Separation, Stabilised
 Units = Literal["si", "aviation"]
 PlotNumbers = Literal["used", "ignored"]
 
+HYPOTHESES_AT_MOST = 2000
 SLOWEST_MPS = 25.0  # an aircraft that lands; birds and rain, with the wind, are slower
 
 
@@ -77,6 +78,7 @@ class RadarSite:
     clutter_per_scan: float | None = None  # plots; None: learnt from its scans
     detection_probability: float | None = None  # of a target in a scan; None: learnt from its scans
     slowest_mps: float = SLOWEST_MPS  # no track of unnumbered plots is told before it surely flies faster
+    hypotheses_at_most: int = HYPOTHESES_AT_MOST  # of unnumbered plots: what bounds the time of a scan
 
 
 @dataclass(frozen=True, slots=True)

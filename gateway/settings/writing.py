@@ -8,6 +8,7 @@ from collections.abc import Iterable
 
 from gateway.settings.safety import Separation, Stabilised
 from gateway.settings.site import (
+    HYPOTHESES_AT_MOST,
     SLOWEST_MPS,
     DeadReckoning,
     Estimation,
@@ -187,11 +188,13 @@ def _radar(radar: RadarSite) -> list[str]:
         ("time_error_ms", 1e3 * radar.time_error_s, "stamps late by"),
     )
     lines += [f"{f'{key} = {value:.6g}':<40s}# {says}" for key, value, says in errors if value]
+    most = radar.hypotheses_at_most
     given = (
         ("period_s", radar.period_s, "of a scan"),
         ("clutter_per_scan", radar.clutter_per_scan, "plots"),
         ("detection_probability", radar.detection_probability, "of a target in a scan"),
         ("slowest_mps", None if radar.slowest_mps == SLOWEST_MPS else radar.slowest_mps, "an aircraft"),
+        ("hypotheses_at_most", None if most == HYPOTHESES_AT_MOST else most, "time of a scan"),
     )
     lines += [f"{f'{key} = {value:.6g}':<40s}# {says}" for key, value, says in given if value is not None]
     lines += ['numbers = "ignored"'] if radar.numbers == "ignored" else []

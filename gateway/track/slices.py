@@ -16,7 +16,6 @@ from gateway.track.sight import RadarSight
 
 GREATEST_LEVEL_MPS, GREATEST_CLIMB_MPS = 300.0, 40.0
 FORGOTTEN_S, FORGOTTEN_SCANS = 10.0, 5.0  # of silence of a whole radar, whichever is longer
-BUDGET = 2000  # hypotheses of a radar
 SURE = 0.5  # a plot is told of a family that has it with more than this weight
 SURE_SIGMAS = 4.5  # of a speed: three in a million, because dozens of birds are asked after every scan
 CONFIRM_AT = 0.9999
@@ -68,7 +67,7 @@ def worked_slice(
     seen = Plots(value, variance, clutter, newborn, np.array([plot.at for plot in plots], dtype=np.int64), serial)
     looked = dict(zip(bank.number.tolist(), bank.looks.tolist(), strict=True))
     was = set(bank.number[bank.confirmed].tolist())
-    bank, found = scan(bank, seen, at, RadarSight(), _splitting(density, options), period_s)
+    bank, found = scan(bank, seen, at, RadarSight(), _splitting(density, site, options), period_s)
     bank = _flying(bank, was, site.slowest_mps)
     best = bank.best
     now = np.flatnonzero(bank.confirmed & (bank.weight[best] > SURE))
@@ -87,7 +86,7 @@ def worked_slice(
     return Slice(index, tuple(plots), bank, density, fresh, found.left_out > 0)
 
 
-def _splitting(density: Density, options: Options) -> Splitting:
+def _splitting(density: Density, site: RadarSite, options: Options) -> Splitting:
     level = options.acceleration_sigma_mps2**2 * options.acceleration_time_s
     upright = options.vertical_acceleration_sigma_mps2**2 * options.acceleration_time_s
     speeds = GREATEST_LEVEL_MPS, GREATEST_LEVEL_MPS, GREATEST_CLIMB_MPS
@@ -96,7 +95,7 @@ def _splitting(density: Density, options: Options) -> Splitting:
         speeds,
         density.detection,
         confirm_at=CONFIRM_AT,
-        budget=BUDGET,
+        budget=site.hypotheses_at_most,
     )
 
 

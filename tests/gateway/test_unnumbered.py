@@ -161,6 +161,16 @@ def test_a_burst_is_survived_and_said(scanning: Any) -> None:
     assert all(len(one.bank) <= 2000 for one in ran.state.unnumbered.watches[1].slices)
 
 
+def test_the_site_file_bounds_what_a_scan_may_take(world: Any) -> None:
+    """Fifty hypotheses are allowed, and 200 clutter plots a scan begin: there are fifty, that is said, the track goes on."""
+    scanning = scanned(world, period_s=0.4, hypotheses_at_most=50)
+    clutter = [one for one in scattered(scanning, 9.0, 200) if one.valid_at > scanning.at(6.0)]
+    ran = scanning.run([*bare(scanning.flight(seconds=9.0, aircraft=None)), *clutter])
+    assert max(len(one.bank) for one in ran.state.unnumbered.watches[1].slices) == 50
+    assert len(ran.said("hypotheses_at_most = 50 in its [[radar]] bounds their number")) == 1
+    assert max(row["time"] for row in ran.rows(updated_by="radar")) > scanning.at(8.0)
+
+
 @pytest.mark.parametrize("scans", [200, pytest.param(10_000, marks=pytest.mark.study)])
 def test_nothing_grows(scanning: Any, scans: int) -> None:
     """Clutter and an aircraft every 20 s: what is kept after all scans is no more than what was kept in the middle."""
@@ -221,10 +231,10 @@ def test_a_radar_that_is_back_after_a_silence_begins_anew_under_other_numbers(sc
 def test_settings_of_unnumbered_plots_are_written_and_read(world: Any) -> None:
     """What is set in the site file stands there when it is written again; what is not set, does not."""
     radar = replace(world.site.radars[0], numbers="ignored", period_s=6.0, clutter_per_scan=40.0, slowest_mps=0.0)
-    radar = replace(radar, detection_probability=0.8)
+    radar = replace(radar, detection_probability=0.8, hypotheses_at_most=500)
     read = parse_site(format_site(with_radar(world.site, radar))).radars[0]
     assert (read.numbers, read.period_s, read.clutter_per_scan) == ("ignored", 6.0, 40.0)
-    assert (read.detection_probability, read.slowest_mps) == (0.8, 0.0)
+    assert (read.detection_probability, read.slowest_mps, read.hypotheses_at_most) == (0.8, 0.0, 500)
     assert "slowest_mps" not in format_site(world.site)
 
 
