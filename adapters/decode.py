@@ -42,6 +42,8 @@ from gateway.picture import Health
 
 Observations = tuple[Observation, ...]
 
+HEALTH_AFTER_NS = SECOND // 4  # of each second: at its beginning there is much else to do
+
 
 class FrameGuard(Protocol):
     """Who decides which MAVLink frames are believed."""
@@ -182,7 +184,7 @@ class Decoder:
 
     def health(self, received_at: int) -> Health:
         """How each source and each vehicle is doing; made once for each second of stamps. Changes no observation."""
-        second, number = received_at // SECOND, len(self._listened)
+        second, number = (received_at - HEALTH_AFTER_NS) // SECOND, len(self._listened)
         if self._health is None or self._health[:2] != (second, number):
             listened = [self._listened[number] for number in sorted(self._listened)]
             names = {one.source.number: one.source.name for one in listened}

@@ -31,12 +31,13 @@ class Turn(IntEnum):
     JUDGING = 8
     LOOKING = 9
     PROBING = 11
+    LOOKING_AT_RADARS = 12
     COMPARING = 13
     JOINING = 15
 
 
 TURN_NS = SECOND // 16
-READING_LANES = frozenset(Turn) - {Turn.REGISTERING, Turn.COMPARING}
+READING_LANES = frozenset(Turn) - {Turn.REGISTERING, Turn.LOOKING_AT_RADARS, Turn.COMPARING}
 
 
 class Work(Reckoning):
@@ -95,6 +96,8 @@ class Work(Reckoning):
             self.probing = self.probing.looking(at, list(self._confirmed()), self.site.separation)
         elif turn == Turn.PROBING:
             self._probe(at)
+        elif turn == Turn.LOOKING_AT_RADARS:
+            self._look_at_radars(at)
         elif turn == Turn.COMPARING:
             self._compare_radars(at)
         elif turn == Turn.JOINING:
@@ -233,16 +236,20 @@ class Work(Reckoning):
             verb = "is" if change.kind == "associated" else "is no longer"
             self.events.append(Event(change.at, "info", f"{change.aircraft} {verb} radar track {change.radar_track}"))
 
+    def _look_at_radars(self, at: int) -> None:
+        """Where the radar tracks of several radars are."""
+        if len(self.radars) > 1:
+            state = associate.looked(self.association.together, at, self.tracks, self.radar_frames)
+            self.association = replace(self.association, together=state)
+
     def _compare_radars(self, at: int) -> None:
-        """Which radar tracks of several radars are one target."""
-        if len(self.radars) < 2:
-            return
+        """Which of them are one target."""
         allowed = remaining(self.registration, self.radars, at)
-        state = associate.compared(self.association.together, at, self.tracks, self.radar_frames, allowed)
+        state = associate.compared(self.association.together, self.tracks, allowed)
         self.association = replace(self.association, together=state)
 
     def _join_radars(self, at: int) -> None:
-        """Radar tracks that were found to be one target, brought into one system track; and others out of it."""
+        """Those that were found to be one target, brought into one system track; and others out of it."""
         state, seen = self.association.together, self.association.together.seen
         if seen is None:
             return

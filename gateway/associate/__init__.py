@@ -25,7 +25,7 @@ from gateway.associate.checks import (
 )
 from gateway.associate.combining import MultiRadar, combined
 from gateway.associate.gates import SILENT_S, Comparison, Nearby, Setting
-from gateway.associate.joining import Together, compared, together
+from gateway.associate.joining import Together, compared, looked, together
 from gateway.associate.ledger import Change, Count, Ledger, Span, Spans, aircraft_of, ordinal_of
 from gateway.associate.pairing import Systematic
 
@@ -52,6 +52,7 @@ __all__ = [
     "combined",
     "compared",
     "forgotten",
+    "looked",
     "missing",
     "ordinal_of",
     "pruned",

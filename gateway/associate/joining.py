@@ -7,7 +7,7 @@ down on a miss, as it is where it is not plain which is meant. Full, the two are
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from gateway.associate.ledger import FAST_HITS
 from gateway.associate.pairing import Pair, Systematic, judged
@@ -22,21 +22,24 @@ class Together:
 
     counts: Mapping[Pair, int] = field(default_factory=dict)
     one: frozenset[Pair] = frozenset()
-    seen: Tracklets | None = None  # what was compared just now, until it is used
+    seen: Tracklets | None = None  # what is to be compared, and was just now, until it is used
 
 
-def compared(
-    state: Together,
-    at: int,
-    tracks: RadarTracks,
-    radars: Mapping[int, RadarFrame],
-    systematic: Mapping[int, Systematic],
-) -> Together:
-    """The state after the check of one instant.
+def looked(state: Together, at: int, tracks: RadarTracks, radars: Mapping[int, RadarFrame]) -> Together:
+    """The state with what is to be compared: where each radar track was a moment before an instant."""
+    return replace(
+        state, seen=tracklets(tracks if len({key[0] for key in tracks.plots}) > 1 else RadarTracks(), at, radars)
+    )
+
+
+def compared(state: Together, tracks: RadarTracks, systematic: Mapping[int, Systematic]) -> Together:
+    """The state after the check of what was looked at; without that the same.
 
     `systematic`: 1 sigma of what radars may still be off by, of those of which it is known.
     """
-    seen = tracklets(tracks if len({key[0] for key in tracks.plots}) > 1 else RadarTracks(), at, radars)
+    seen = state.seen
+    if seen is None:
+        return state
     alive = frozenset(seen.keys)
     counts = {
         pair: value for pair, value in state.counts.items() if pair[0] in tracks.plots and pair[1] in tracks.plots

@@ -44,7 +44,7 @@ class Apart:
         if serve is not None:
             serve = serve[0], free_port(*serve)
         self._path = path
-        self._gathered: list[Picture] = []
+        self._gathered: list[bytes] = []  # each pickled by itself: many at once would hold the interpreter for long
         self._since: int | None = None
         self._health_at: int | None = None
         self._attitude_at: dict[str, int] = {}
@@ -68,7 +68,7 @@ class Apart:
 
     def write(self, picture: Picture) -> None:
         """Take one picture; raises OSError for what became of those before."""
-        self._gathered.append(self._as_drawn(picture))
+        self._gathered.append(pickle.dumps(self._as_drawn(picture), pickle.HIGHEST_PROTOCOL))
         if self._since is None:
             self._since = picture.now
         waited = picture.now - self._since

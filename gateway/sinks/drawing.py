@@ -54,6 +54,10 @@ def draw(source: BinaryIO, target: BinaryIO) -> None:
                 site, arguments = about
                 sink = RerunSink(site, **arguments)
                 _give_way()
+            elif what == "write_all":
+                assert sink is not None
+                (gathered,) = about
+                sink.write_all([pickle.loads(picture) for picture in gathered])
             else:
                 getattr(sink, what)(*about)
             _answer(target, sink)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gateway.associate import Together, compared, together
+from gateway.associate import Together, compared, looked, together
 from gateway.associate.pairing import judged
 from gateway.associate.tracklets import Tracklets, tracklets
 from gateway.track import RadarTracks
@@ -92,7 +92,7 @@ def test_five_checks_make_a_pair_and_five_misses_undo_it(world: Any) -> None:
     other = RadarTracks({**same.plots, (2, 1, 0): other.plots[2, 2, 0]})  # the number 2/1 is on the other aircraft
     state, made = Together(), []
     for tracks in (*[same] * 6, *[other] * 6):
-        state = compared(state, there.at(8.0), tracks, there.radars, {})
+        state = compared(looked(state, there.at(8.0), tracks, there.radars), tracks, {})
         made.append(((1, 1, 0), (2, 1, 0)) in state.one)
     assert made == [False] * 4 + [True] * 6 + [False] * 2
     assert state.seen is not None

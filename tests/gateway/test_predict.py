@@ -217,7 +217,7 @@ def test_how_arrivals_fall_into_ticks_changes_no_bit() -> None:
 
 def test_many_tracks_are_predicted_part_by_part_within_the_second() -> None:
     """Of fewer than three times as many as go together three parts, each at its own instant; every track once."""
-    many = range(1, 3 * TOGETHER - 50)
+    many = range(1, 3 * TOGETHER - TOGETHER // 2)
     planned = Predicting().planning(many, T0)
     at, found = [], []
     while planned.due < T0 + SECOND:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import resource
 import signal
 import socket
@@ -78,7 +79,9 @@ def test_of_attitudes_that_come_thick_fifty_a_second_of_each_aircraft_are_carrie
     """To carry five hundred over takes longer than to draw them, and nobody sees a symbol turn so often."""
     carried: list[Picture] = []
     monkeypatch.setattr(
-        Apart, "_tell", lambda self, what, *about: carried.extend(about[0] if what == "write_all" else ())
+        Apart,
+        "_tell",
+        lambda self, what, *about: carried.extend(map(pickle.loads, about[0] if what == "write_all" else ())),
     )
     sink = Apart(DEMO_SITE, path=None, serve=None)
     made = pictures(1.0)[0]
