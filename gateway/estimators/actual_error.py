@@ -4,7 +4,7 @@ A mode's noise stands for manoeuvres, and the filter reckons with them all the t
 filter's error is what the measurements' noise leaves, which is two thirds to three quarters of what it reckons with, and the
 mixture of modes that stay improbable adds to that. What is told to others is therefore carried beside the filter: the error
 goes through the same transitions and the gains that were really used (Joseph's form holds for any gain), with a share of the
-modes' noise only. What the modes disagree by is added where it is told.
+modes' noise only. What the modes disagree by is added where it is told, of those that something speaks for (`counted`).
 
 Arrays are over n tracks and m modes, as in `modes`.
 """
@@ -52,6 +52,15 @@ def corrected(error: Floats, weight: Floats, told: Innovation, mean: Floats, cov
         _, whole = matched(weight[out, :, None], mean[out], covariance[out])
         after[out] = whole[:, 0]
     return after
+
+
+def counted(weight: Floats, shares: Floats) -> Floats:
+    """How much modes' disagreement counts, (n, m), by their weights (n, m) and their shares (m,) of an aircraft's time.
+
+    A mode that is less likely than ever has the measurements against it: what is left of its weight is mostly what mixing
+    gave it, and mixing lets manoeuvres begin far more often than aircraft do. It counts that much less again.
+    """
+    return np.asarray(weight * np.minimum(weight / shares, 1.0))
 
 
 def _whole(weight: Floats, parts: Floats) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,8 @@ class Told:
     scatter: Floats  # (n, k, k) what innovations scatter by: by the error that the filter really makes; where not measured, 1
 
     @classmethod
-    def of(cls, prior: Floats, each: Innovation, mode_log_likelihood: Floats, error: Floats, unmixed: Floats) -> Told:
-        """From the errors (n, d, d) of the mixtures before it and the weights (n, m) before the modes mixed.
+    def of(cls, prior: Floats, each: Innovation, mode_log_likelihood: Floats, error: Floats, counted: Floats) -> Told:
+        """From the errors (n, d, d) of the mixtures before it and how much the modes' disagreement counts, (n, m).
 
         Modes that have not begun are no part of the scatter: they are begun far more often by the filter than by aircraft.
         """
@@ -38,8 +38,13 @@ class Told:
         scatter = first @ error @ first.transpose(0, 2, 1)
         along = np.arange(scatter.shape[-1])
         scatter[:, along, along] += each.noise[::m]
-        scatter += (unmixed[:, :, None] * off).transpose(0, 2, 1) @ off
+        scatter += (counted[:, :, None] * off).transpose(0, 2, 1) @ off
         return cls(prior, each, mode_log_likelihood, first, innovation[:, 0], scatter)
+
+    def lagging(self, lag: Floats) -> Told:
+        """The same of tracks that lag behind, which adds `lag` (n, d, d) to their errors."""
+        first = self.sensitivity
+        return replace(self, scatter=self.scatter + first @ lag @ first.transpose(0, 2, 1))
 
     @property
     def covariance(self) -> Floats:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gateway.estimators.kalman import SIZE, Estimate
 from gateway.estimators.lagging import lag
-from gateway.estimators.matching import matched, spread
+from gateway.estimators.matching import matched
 
 Floats = NDArray[np.float64]
 
@@ -20,8 +20,8 @@ class Mixture:
     """n tracks in m modes of d states, 9 or 11 (`holding`): mean (n, m, d), covariance (n, m, d, d), weight (n, m), in all 1.
 
     What is remembered of the residuals: their faded score (n, m, 3) with its information (n, m, 3, 3), those of the whole
-    (n, 3) and (n, 3, 3), and for `literal` the last ones in metres (n, m, 5, 3), NaN before they are (for the other rules
-    there is none).
+    (n, 2, 3) and (n, 2, 3, 3), of position and of velocity, and for `literal` the last ones in metres (n, m, 5, 3), NaN
+    before they are (for the other rules there is none).
     """
 
     mean: Floats
@@ -34,7 +34,7 @@ class Mixture:
     recent: Floats
     elapsed_s: Floats  # (n,) since the last measurement
     error: Floats  # (n, d, d) of the combined state, as `actual_error` has it
-    unmixed: Floats  # (n, m) the weights before the modes last mixed
+    counted: Floats  # (n, m) how much the modes' disagreement counts, by their weights before they last mixed
 
     @property
     def size(self) -> int:
@@ -72,7 +72,7 @@ def _parts(mixture: Mixture) -> tuple[Floats, ...]:
         mixture.recent,
         mixture.elapsed_s,
         mixture.error,
-        mixture.unmixed,
+        mixture.counted,
     )
 
 
@@ -87,7 +87,10 @@ def stated(mixture: Mixture) -> Estimate:
 
     `combine` has the covariance that the filter reckons with.
     """
-    mean, apart = spread(mixture.weight[:, :, None], mixture.mean)
-    covariance = mixture.error + apart[:, 0]
-    covariance = covariance + lag(mixture.whole_score, mixture.whole_information, covariance)
+    mean = mixture.weight[:, None, :] @ mixture.mean
+    off = mixture.mean - mean
+    covariance = mixture.error + (mixture.counted[:, :, None] * off).transpose(0, 2, 1) @ off
+    behind = lag(mixture.whole_score, mixture.whole_information, covariance)
+    if behind is not None:
+        covariance = covariance + behind
     return Estimate(mean[:, 0, :SIZE], covariance[:, :SIZE, :SIZE])

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators import lagging
-from gateway.estimators.actual_error import carried_on, corrected
+from gateway.estimators.actual_error import carried_on, corrected, counted
 from gateway.estimators.holding import WIDE, Held, add_held, turn_along, usual
 from gateway.estimators.kalman import SIZE, Estimate, Innovation, Motion
 from gateway.estimators.kalman import update as update_each
@@ -181,8 +181,8 @@ def begin(state: Estimate, modes: Modes) -> Mixture:
         np.repeat(modes.shares[None], n, axis=0),
         np.zeros((n, m, 3)),
         np.zeros((n, m, 3, 3)),
-        np.zeros((n, 3)),
-        np.zeros((n, 3, 3)),
+        np.zeros((n, 2, 3)),
+        np.zeros((n, 2, 3, 3)),
         np.full((n, m, WINDOW if modes.rule == "literal" else 0, 3), math.nan),
         np.zeros(n),
         covariance.copy(),
@@ -213,7 +213,7 @@ def predict(mixture: Mixture, elapsed_s: Floats, modes: Modes, transition: Float
         weight=weight,
         elapsed_s=mixture.elapsed_s + elapsed_s,
         error=carried_on(mixture.error, weight, carry, noise),
-        unmixed=mixture.weight,
+        counted=counted(mixture.weight, modes.shares),
     )
 
 
@@ -275,7 +275,7 @@ def weigh(mixture: Mixture, after: Estimate, told: Innovation, modes: Modes) -> 
     weight = np.maximum(weight / weight.sum(axis=1, keepdims=True), LEAST_WEIGHT)
     weight /= weight.sum(axis=1, keepdims=True)
     mean, covariance = after.mean.reshape(n, m, -1), after.covariance.reshape(mixture.covariance.shape)
-    whole = Told.of(mixture.weight, told, likelihood, mixture.error, mixture.unmixed)
+    whole = Told.of(mixture.weight, told, likelihood, mixture.error, mixture.counted)
     whole_score, whole_information = lagging.faded(
         mixture.whole_score,
         mixture.whole_information,
@@ -284,6 +284,7 @@ def weigh(mixture: Mixture, after: Estimate, told: Innovation, modes: Modes) -> 
         whole.sensitivity,
         mixture.elapsed_s,
     )
+    lag = lagging.lag(mixture.whole_score, mixture.whole_information, mixture.error)
     error = corrected(mixture.error, weight, told, mean, covariance)
     mixture_after = Mixture(
         mean,
@@ -296,6 +297,6 @@ def weigh(mixture: Mixture, after: Estimate, told: Innovation, modes: Modes) -> 
         recent,
         np.zeros(n),
         error,
-        weight,
+        counted(weight, modes.shares),
     )
-    return mixture_after, whole
+    return mixture_after, whole if lag is None else whole.lagging(lag)

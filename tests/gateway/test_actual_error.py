@@ -66,6 +66,13 @@ def test_one_mode_that_is_shaken_as_it_reckons_makes_the_error_that_it_reckons_w
         assert error == pytest.approx(mixture.covariance[:, 0], rel=1e-9, abs=1e-9)
 
 
+def test_modes_that_the_measurements_speak_against_hardly_count() -> None:
+    """At its usual share of the time or above a mode counts by its weight, at a tenth of it by a hundredth."""
+    shares = np.array([0.8, 0.1, 0.1])
+    assert actual_error.counted(shares, shares) == pytest.approx(shares)
+    assert actual_error.counted(np.array([0.09, 0.9, 0.01]), shares) == pytest.approx([0.09**2 / 0.8, 0.9, 0.001])
+
+
 def test_what_something_else_has_bounded_is_bounded_here_too() -> None:
     """Where the filter's own covariance is less than half of the error's, the filter's is taken."""
     modes = Modes((Mode(0.0, CALM),), "imm")
