@@ -94,7 +94,7 @@ class _Hearing:
 
     def _hear_each(self, places: Integers, state: _State) -> int:
         """Hear frames one by one until one changes the state; the place up to which they were heard."""
-        waiting, components = self._waiting, self._components
+        waiting, components, may_gather = self._waiting, self._components, not state[-1]
         heads, senders, passing = self._heads[places], self._senders[places], self._passes[places]
         for place, head, sender, passes, arrival in zip(
             places.tolist(), heads.tolist(), senders.tolist(), passing.tolist(), self._arrivals.at(places), strict=True
@@ -102,7 +102,7 @@ class _Hearing:
             waiting.at = place
             if sender < 0:
                 self._hear(place, arrival, head)
-            elif passes and not self._state()[-1]:
+            elif passes and may_gather:
                 self._gather(place, arrival, components[sender], head >> 24)
             else:
                 heard = self._by.hear_counted(arrival, components[sender], head >> 24)

@@ -95,7 +95,7 @@ def _in_order(said: list[tuple[int, Heard]]) -> list[object]:
         for one in heard.observations:
             if isinstance(one, Many):
                 passing += one
-            elif isinstance(one, Attitude | ImuSample | AirData):
+            elif isinstance(one, Attitude | ImuSample) or (isinstance(one, AirData) and one.wind_east_mps is None):
                 passing.append(one)
             else:
                 staged.append((place, heard.now, one))
