@@ -98,7 +98,7 @@ class Making:
         return replace(health, vehicles=tuple(vehicles))
 
     def _scene(self) -> Scene:
-        return Scene(self.tracks, self._spans, self.options)
+        return Scene(self.tracks, self._spans, self.options, self.predicting.headings)
 
     @property
     def _spans(self) -> Spans:

@@ -290,6 +290,8 @@ class Work(Reckoning):
         if alive and at % SECOND == 0 and at % int(self.options.prediction_period_s * SECOND) == 0:
             self.predicting = self.predicting.planning([lane.track for lane in alive], at)
             self._foretell(at)
+        if self.model.modes is not None and at % SECOND == 0:
+            self.predicting = self.predicting.heading(at, at - self.history)
 
     def _foretell(self, at: int) -> None:
         """The predictions that are due."""

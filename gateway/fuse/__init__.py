@@ -9,6 +9,7 @@ tracks at once; `weighting` holds the four ways to weigh a position source again
 from gateway.fuse.agreement import CONFIRMED
 from gateway.fuse.becoming import joined
 from gateway.fuse.continuing import adopted_earlier, continued, reviewed, spans_with, taken_on
+from gateway.fuse.headings import Headings
 from gateway.fuse.joints import Regrouped, radar_tracks_of_aircraft, regrouped, remembered
 from gateway.fuse.lanes import Adopted, Ended, Joint, Lane, Lanes, contains, emptied
 from gateway.fuse.life import LifeChange, end_silent, sentence, told
@@ -21,6 +22,7 @@ __all__ = [
     "Adopted",
     "Ended",
     "Fused",
+    "Headings",
     "Joint",
     "Lane",
     "Lanes",

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.align import Fix, Plot
-from gateway.estimators import modes
+from gateway.estimators import intent, modes
 from gateway.estimators.kalman import SIZE, Estimate, Innovation, predict
 from gateway.estimators.modes import Mixture, Modes
 from gateway.fuse.events import Belief, Event, Measure, Near
@@ -43,6 +43,7 @@ class Group:
     near: Sequence[Near | None]
     elapsed_s: Floats  # (n,) since each track's state
     memory: Floats  # (n, w, 3) past innovations of the position source
+    goal: Floats | None = None  # (n, 2) east and north of where it is said to go, NaN = nobody says; None = of nobody
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +122,8 @@ class InteractingModels:
     def advance(self, before: Sequence[Event], group: Group) -> Advanced:
         """See `Estimator`."""
         m, n = self.modes.count, len(before)
-        mixtures = modes.predict(_mixtures(before), group.elapsed_s, self.modes)
+        mixtures = _mixtures(before)
+        mixtures = modes.predict(mixtures, group.elapsed_s, self.modes, self._changes(mixtures, before, group))
         measures, near = (
             [one for one in group.measures for _ in range(m)],
             [one for one in group.near for _ in range(m)],
@@ -137,6 +139,14 @@ class InteractingModels:
         if group.kind != "literal":  # a weight of a single residual squared leaves nothing to judge it by
             residual = _residual(told.innovation, told.scatter, each.measured[::m])
         return Advanced(modes.stated(mixtures), beliefs, known, told.outlying, far, residual)
+
+    def _changes(self, mixtures: Mixture, before: Sequence[Event], group: Group) -> Floats | None:
+        """The modes' transitions of tracks some of which fly at where they say they go; None where nobody says it."""
+        if group.goal is None:
+            return None
+        mean = stacked([event.mean for event in before])
+        off = intent.off_course(mean[:, :2], mean[:, 3:5], group.goal[:, None])[:, 0]
+        return intent.transition(self.modes, group.elapsed_s, np.abs(off) <= intent.ALIGNED_RAD)
 
     def ahead(self, events: Sequence[Event], elapsed_s: Floats) -> tuple[Estimate, Floats]:
         """See `Estimator`."""

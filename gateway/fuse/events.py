@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gateway.align import Fix, Plot, Polar
 from gateway.estimators.modes import Mixture
+from gateway.fuse.headings import Heading
 
 Floats = NDArray[np.float64]
 Measure = Fix | Plot
@@ -94,6 +95,7 @@ class Job:
     measures: Sequence[Measure]
     neighbour: Neighbour
     fresh: int = -1  # serial of the measurement that asked for it
+    headings: tuple[Heading, ...] = ()  # where its aircraft says it goes
 
 
 def rank(measure: Measure) -> tuple[int, int, str, int]:

@@ -25,6 +25,7 @@ from gateway.fuse.diverging import (
 )
 from gateway.fuse.estimating import Estimator, Group, InteractingModels, SingleModel, stacked
 from gateway.fuse.events import NEVER, Belief, Event, Job, Measure, Near, Neighbour, Residual, rank
+from gateway.fuse.headings import Point, goal_at
 from gateway.fuse.light import LightFilter
 from gateway.fuse.resuming import resumed
 from gateway.fuse.weighting import Model
@@ -38,12 +39,16 @@ def run(jobs: Sequence[Job], model: Model) -> list[list[Event]]:
     """The events of each job, one a measurement. Tracks do not touch each other: any batching gives the same bits."""
     estimator = estimator_of(model)
     events: list[list[Event]] = [[] for _ in jobs]
+    heads = any(job.headings for job in jobs)
     for turn in range(max((len(job.measures) for job in jobs), default=0)):
         active = [index for index, job in enumerate(jobs) if turn < len(job.measures)]
         bases = [events[index][-1] if turn else jobs[index].base for index in active]
         measures = [jobs[index].measures[turn] for index in active]
         neighbours = [jobs[index].neighbour for index in active]
-        for index, event in zip(active, _advance(bases, measures, neighbours, estimator, model), strict=True):
+        goals = None
+        if heads:
+            goals = [goal_at(jobs[index].headings, measure.at) for index, measure in zip(active, measures, strict=True)]
+        for index, event in zip(active, _advance(bases, measures, neighbours, goals, estimator, model), strict=True):
             events[index].append(event)
     return events
 
@@ -69,6 +74,7 @@ def _advance(
     bases: Sequence[Event | None],
     measures: Sequence[Measure],
     neighbours: Sequence[Neighbour],
+    goals: Sequence[Point] | None,
     estimator: Estimator,
     model: Model,
 ) -> list[Event]:
@@ -91,8 +97,10 @@ def _advance(
         rows, before, chosen, taken, seen = zip(*members, strict=True)
         elapsed_s = np.array([(measure.at - base.at) / SECOND for base, measure in zip(before, chosen, strict=True)])
         memory = stacked([base.memory for base in before])
+        goal = None if goals is None else np.array([goals[row] for row in rows])
+        group = Group(kind, radar, taken, seen, elapsed_s, memory, goal)
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):  # what comes of it is begun anew
-            after = estimator.advance(before, Group(kind, radar, taken, seen, elapsed_s, memory))
+            after = estimator.advance(before, group)
         all_sound = is_sound(after.state)
         states = zip(after.state.mean, after.state.covariance, after.memory, after.beliefs, strict=True)
         residuals = [None] * len(before) if after.residual is None else list(zip(*after.residual, strict=True))

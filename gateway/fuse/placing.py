@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from gateway.align import SECOND, Fix, Plot, ReckonedFix, bracket
 from gateway.associate import Spans, aircraft_of, ordinal_of
 from gateway.fuse.filtering import Job, Measure, Near, Neighbour, rank
+from gateway.fuse.headings import Headings
 from gateway.fuse.lanes import Lane, Lanes, contains
 from gateway.fuse.life import lane_of_report
 from gateway.settings import Options
@@ -32,6 +33,7 @@ class Scene:
     tracks: RadarTracks
     spans: Spans
     options: Options
+    headings: Headings = Headings()
 
     def neighbour(self, lane: Lane) -> Neighbour:
         """The plot of this lane's radar track at a report's time, for the literal weighting."""
@@ -145,7 +147,14 @@ def _inserted(lanes: Lanes, lane: Lane, measure: Measure, scene: Scene) -> tuple
         )
         following = [*(event.measure for event in events[touched:place]), *following]
         place = touched
-    job = Job(lane.track, events[place - 1] if place else None, following, scene.neighbour(lane), measure.serial)
+    job = Job(
+        lane.track,
+        events[place - 1] if place else None,
+        following,
+        scene.neighbour(lane),
+        measure.serial,
+        scene.headings.of(lane.aircraft),
+    )
     return lanes.with_lane(lane.with_events(events[:place])), job
 
 
@@ -174,7 +183,9 @@ def _rebuilt(lanes: Lanes, lane: Lane, at: int, scene: Scene) -> tuple[Lanes, Jo
     if base is not None:
         measures = [measure for measure in measures if rank(measure) > rank(base.measure)]
     measures.sort(key=rank)
-    return lanes, Job(lane.track, base, measures, scene.neighbour(lane)) if measures else None
+    if not measures:
+        return lanes, None
+    return lanes, Job(lane.track, base, measures, scene.neighbour(lane), headings=scene.headings.of(lane.aircraft))
 
 
 def _begun_from_plots(lanes: Lanes, key: Key, ordinal: int, scene: Scene) -> tuple[Lanes, Job | None]:

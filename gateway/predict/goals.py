@@ -51,6 +51,14 @@ class Goals:
     declared_at: int = 0
     lowered: Floats = field(default_factory=lambda: np.ones(COUNT))  # (c,) of the weight, where weather is in the way
 
+    @property
+    def heading(self) -> tuple[float, float]:
+        """East and north of the point that it is said to fly at, NaN = none, and none that it flies round."""
+        if self.declared < 0 or self.circles[self.declared]:
+            return math.nan, math.nan
+        east, north = self.route[self.declared, 0].tolist()
+        return east, north
+
 
 def goals_of(told: Told | None, site: Site, frame: RunwayFrame, separation_m: float) -> Goals:
     """What is known of one aircraft's goals; `separation_m` lifts altitudes above mean sea level."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from gateway.align import SECOND
 from gateway.frames import RunwayFrame
-from gateway.fuse import Lane
+from gateway.fuse import Headings, Lane
 from gateway.observation import WeatherArea
 from gateway.predict.gates import Gates
 from gateway.predict.goals import Goals, goals_of
@@ -31,6 +31,7 @@ class Predicting:
     separation_m: float = 0.0  # of the geoid, as the goals have it
     planned: tuple[tuple[int, tuple[int, ...]], ...] = ()  # when which tracks are predicted next
     gates: Gates = Gates()  # what is remembered of finals
+    headings: Headings = Headings()  # where aircraft say they go, as the filter of several modes uses it
 
     @property
     def due(self) -> int:
@@ -75,6 +76,12 @@ class Predicting:
             return self
         made = {one: goals_of(told.get(one) if one else None, site, frame, separation_m) for one in missing}
         return replace(self, goals={**goals, **made}, separation_m=separation_m)
+
+    def heading(self, at: int, before: int) -> Predicting:
+        """The same with where aircraft say at an instant that they go told to the filter; `before` nobody asks any more."""
+        told = self.tellings.by_aircraft
+        goals = {one: goal.heading for one, goal in self.goals.items() if one is not None and one in told}
+        return replace(self, headings=self.headings.known(at, goals, told, before))
 
     def forgotten(self, lanes: Mapping[int, Lane], by_aircraft: Mapping[str, int], at: int) -> Predicting:
         """The same without what is said of aircraft, and thought of tracks, that are long gone."""

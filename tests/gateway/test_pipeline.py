@@ -447,7 +447,7 @@ def test_a_rows_coordinates_are_one_place(world: Any) -> None:
 
 
 def test_predictions_are_made_each_second_for_every_track(world: Any) -> None:
-    """At whole seconds each living track is carried on to 10, 30 and 60 s, less and less certain."""
+    """At whole seconds each living track is carried on to 10, 30, 60 and 120 s, less and less certain."""
     ran = world.run(world.flight(seconds=20.0))
     made = [int(at) for picture in ran.pictures for at in picture.predict.made]
     assert all(at % world.SECOND == 0 for at in made)
@@ -455,9 +455,9 @@ def test_predictions_are_made_each_second_for_every_track(world: Any) -> None:
     (picture,) = ran.pictures
     table = picture.predict
     assert ((table.valid - table.made) / 1e9).tolist() == table.horizon_s.tolist()
-    assert table.horizon_s[:3].tolist() == [10.0, 30.0, 60.0]
-    assert (table.sigma_m[2::3] > table.sigma_m[::3]).all()
-    last = len(table.made) - 3
+    assert table.horizon_s[:4].tolist() == [10.0, 30.0, 60.0, 120.0]
+    assert (table.sigma_m[2::4] > table.sigma_m[::4]).all()
+    last = len(table.made) - 4
     course = world.Course()
     there = course.at((int(table.valid[last]) - world.START) / 1e9)
     assert math.dist(table.runway_m[last].tolist(), there.tolist()) < 100.0  # 10 s on: 5 m/s and the curve
