@@ -20,6 +20,7 @@ from bench.live_fleet import live_fleet
 from bench.live_rates import live_rates
 from bench.lively import core_share, lateness
 from bench.measure import Figure, load, machine
+from bench.probing import probing
 from bench.registration import registration
 from bench.replays import help_text, ten_hours, ten_minutes
 from bench.throughput import throughput
@@ -48,6 +49,7 @@ class Part(StrEnum):
     clutter = "clutter"
     registration = "registration"
     foretelling = "foretelling"
+    probing = "probing"
     fleet = "fleet"
     memory = "memory"
     hours = "hours"
@@ -116,6 +118,9 @@ def _measure(wanted: set[Part], runs: int, seconds: float, traffic_hours: int, c
         if Part.foretelling in wanted:
             say("predictions of 1000 aircraft that have told their plans")
             figures += foretelling(2 * runs)
+        if Part.probing in wanted:
+            say("the conflict probe of 1000 aircraft")
+            figures += probing(2 * runs)
         if Part.fleet in wanted:
             say("100 vehicles with two radars, and 1000 aircraft, live")
             figures += live_fleet(RATES_S)

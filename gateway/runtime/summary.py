@@ -25,6 +25,7 @@ KINDS = {
     "VehicleStatus": "vehicle status",
     "FlightPlan": "flight plans",
     "Intent": "intents",
+    "WeatherArea": "areas of weather",
     "Truth": "truths",
 }
 
