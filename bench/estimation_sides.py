@@ -193,13 +193,19 @@ def stone_soup(problem: Problem) -> Run:
     from stonesoup.types.state import GaussianState
     from stonesoup.updater.kalman import KalmanUpdater
 
+    class Sum(LinearGaussian):
+        """Position and the source's error together, which no mapping of single states tells."""
+
+        def matrix(self, **_: Any) -> Floats:
+            return problem.sensitivity
+
     k, d = problem.sensitivity.shape
     models, begin = range(len(problem.share)), datetime(2026, 1, 1)
     predictors = [
         KalmanPredictor(LinearGaussianTimeInvariantTransitionModel(transition_matrix=f, covariance_matrix=q))
         for f, q in zip(problem.carry, problem.noise, strict=True)
     ]
-    updater = KalmanUpdater(LinearGaussian(d, tuple(range(k)), problem.variance * np.eye(k)))
+    updater = KalmanUpdater(Sum(d, tuple(range(k)), problem.variance * np.eye(k)))
 
     def matched(share: Floats, states: list[Any]) -> States:
         mean = sum(share[i] * np.asarray(states[i].state_vector, float)[:, 0] for i in models)

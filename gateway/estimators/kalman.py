@@ -153,7 +153,8 @@ def update(
     cross = state.covariance @ across
     m = y.shape[1]
     s = h @ cross
-    s[:, _ALONG[:m], _ALONG[:m]] += r
+    along = s.reshape(-1, m * m)[:, :: m + 1]
+    along += r
     inverse = np.asarray(np.linalg.inv(s))
     column = y[:, :, None]
     fit = normalised = _square(column, inverse)
@@ -163,7 +164,7 @@ def update(
         outlying, growth = _growth(normalised, limit, s, missing, together)
         if growth is not None:
             r = r + growth
-            s[:, _ALONG[:m], _ALONG[:m]] += growth
+            along += growth
             inverse = np.asarray(np.linalg.inv(s))
             fit = _square(column, inverse)
     gain = cross @ inverse

@@ -36,8 +36,9 @@ class Told:
         off = shaped - innovation
         first = each.sensitivity[:: m if len(each.sensitivity) > 1 else 1]
         scatter = first @ error @ first.transpose(0, 2, 1)
-        along = np.arange(scatter.shape[-1])
-        scatter[:, along, along] += each.noise[::m]
+        size = scatter.shape[-1]
+        along = scatter.reshape(n, size * size)[:, :: size + 1]
+        along += each.noise[::m]
         scatter += (counted[:, :, None] * off).transpose(0, 2, 1) @ off
         return cls(prior, each, mode_log_likelihood, first, innovation[:, 0], scatter)
 

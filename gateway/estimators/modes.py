@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -198,7 +198,7 @@ def predict(mixture: Mixture, elapsed_s: Floats, modes: Modes, transition: Float
     """
     chance = modes.transition(elapsed_s) if transition is None else transition
     joint = mixture.weight[:, :, None] * chance
-    weight = joint.sum(axis=1)
+    weight = np.add.reduce(joint, axis=1)
     mean, covariance = mixture.mean, mixture.covariance
     if modes.count > 1:
         mean, covariance = matched(joint / weight[:, None], mean, covariance)
@@ -206,14 +206,18 @@ def predict(mixture: Mixture, elapsed_s: Floats, modes: Modes, transition: Float
     mean = (carry @ mean[..., None])[..., 0]
     covariance = carry @ covariance @ carry.swapaxes(-1, -2) + noise
     covariance = 0.5 * (covariance + covariance.swapaxes(-1, -2))
-    return replace(
-        mixture,
-        mean=mean,
-        covariance=covariance,
-        weight=weight,
-        elapsed_s=mixture.elapsed_s + elapsed_s,
-        error=carried_on(mixture.error, weight, carry, noise),
-        counted=counted(mixture.weight, modes.shares),
+    return Mixture(
+        mean,
+        covariance,
+        weight,
+        mixture.score,
+        mixture.information,
+        mixture.whole_score,
+        mixture.whole_information,
+        mixture.recent,
+        mixture.elapsed_s + elapsed_s,
+        carried_on(mixture.error, weight, carry, noise),
+        mixture.weight,
     )
 
 
@@ -271,9 +275,9 @@ def weigh(mixture: Mixture, after: Estimate, told: Innovation, modes: Modes) -> 
     elif modes.rule == "literal":
         recent = np.concatenate([recent[:, :, 1:], in_metres(told).reshape(n, m, 1, 3)], axis=2)
         log -= np.log(mean_size_m(recent))
-    weight = np.exp(log - log.max(axis=1, keepdims=True))
-    weight = np.maximum(weight / weight.sum(axis=1, keepdims=True), LEAST_WEIGHT)
-    weight /= weight.sum(axis=1, keepdims=True)
+    weight = np.exp(log - np.maximum.reduce(log, axis=1, keepdims=True))
+    weight = np.maximum(weight / np.add.reduce(weight, axis=1, keepdims=True), LEAST_WEIGHT)
+    weight /= np.add.reduce(weight, axis=1, keepdims=True)
     mean, covariance = after.mean.reshape(n, m, -1), after.covariance.reshape(mixture.covariance.shape)
     whole = Told.of(mixture.weight, told, likelihood, mixture.error, mixture.counted)
     whole_score, whole_information = lagging.faded(
