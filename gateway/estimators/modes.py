@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -206,18 +206,14 @@ def predict(mixture: Mixture, elapsed_s: Floats, modes: Modes, transition: Float
     mean = (carry @ mean[..., None])[..., 0]
     covariance = carry @ covariance @ carry.swapaxes(-1, -2) + noise
     covariance = 0.5 * (covariance + covariance.swapaxes(-1, -2))
-    return Mixture(
-        mean,
-        covariance,
-        weight,
-        mixture.score,
-        mixture.information,
-        mixture.whole_score,
-        mixture.whole_information,
-        mixture.recent,
-        mixture.elapsed_s + elapsed_s,
-        carried_on(mixture.error, weight, carry, noise),
-        mixture.weight,
+    return replace(
+        mixture,
+        mean=mean,
+        covariance=covariance,
+        weight=weight,
+        elapsed_s=mixture.elapsed_s + elapsed_s,
+        error=carried_on(mixture.error, weight, carry, noise),
+        counted=counted(mixture.weight, modes.shares),
     )
 
 
