@@ -3,7 +3,7 @@
 python -m bench.live_fleet KIND AIRCRAFT SECONDS       prints, as JSON, what one run gave; KIND as in `bench.sky`
 
 The whole gateway runs with its archive and a server for viewers, the sky in another process. The time of an observation
-ends when its picture is with every sink. The CPU time of the process that draws counts as the gateway's.
+ends when its picture is made and handed to every sink. The CPU time of the process that draws counts as the gateway's.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def live_fleet(seconds: float) -> list[Figure]:
 
 
 class Stopwatch:
-    """Watches a live run: for each position and plot, how long after its arrival its picture was with every sink."""
+    """Watches a live run: for each position and plot, how long after its arrival its picture was made."""
 
     def __init__(self) -> None:
         self.meter = Meter()

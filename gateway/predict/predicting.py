@@ -17,7 +17,7 @@ from gateway.predict.minds import Remembered
 from gateway.predict.told import Said, Tellings
 from gateway.settings import Site
 
-TOGETHER = 50  # tracks that are predicted at once; of more, each part has its own instant within the second
+TOGETHER = 100  # tracks that are predicted at once; of more, each part has its own instant within the second
 NEVER = 1 << 62
 
 
