@@ -16,7 +16,6 @@ from gateway.reckon.told import AIRSPEED, ALTITUDE, ATTITUDE, PLACE, Series, Tol
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 CELL_NS = 100_000_000
 CELL_S = CELL_NS / 1e9
@@ -34,7 +33,7 @@ class Cells:
     rate_radps: Floats  # (n, 3)
     force_mps2: Floats  # (n, 3)
     unseen: Floats  # (n, 6) of force and rate, in a root Hz: what moved between samples and was not seen
-    is_told: Bools  # (n,) whether the rate is that of the autopilot's attitude
+    turned_radps: Floats  # (n, 3) the rate by the autopilot's attitude; NaN where it does not tell it often enough
     attitude: Floats  # (n, 4)
     airspeed_mps: Floats  # (n,) indicated
     altitude_m: Floats  # (n,)
@@ -75,18 +74,17 @@ def cells(told: Told, first: int, end: int) -> Cells:
     """What was told in the cells from `first` up to `end`, which the unit's samples must cover."""
     inertial, n = told.inertial, end - first
     means = _means(inertial, first - 1, n + 1)
-    attitude, rate, is_told = _attitudes(told, means[:, 3:6], first, n)
+    attitude, turned = _attitudes(told, means[:, 3:6], first, n)
     unseen = _unseen(inertial, first, n)
-    unseen[is_told, 3:] = 0.0
     place, place_late = _first_of_blocks(told.places, first, n)
     pictured, pictured_late = _first_of_blocks(told.pictured, first, n)
     airspeed, altitude = (_last(told.series[kind], first, n)[0][:, 0] for kind in (AIRSPEED, ALTITUDE))
     return Cells(
         first,
-        rate,
+        means[1:, 3:6],
         means[1:, :3],
         unseen,
-        is_told,
+        turned,
         attitude,
         airspeed,
         altitude,
@@ -97,20 +95,17 @@ def cells(told: Told, first: int, end: int) -> Cells:
     )
 
 
-def _attitudes(told: Told, gyro_radps: Floats, first: int, n: int) -> tuple[Floats, Floats, Bools]:
-    """The autopilot's attitude at the ends of cells (n, 4), the rates (n, 3) of cells, and whether these are its own.
+def _attitudes(told: Told, gyro_radps: Floats, first: int, n: int) -> tuple[Floats, Floats]:
+    """The autopilot's attitude at the ends of cells (n, 4), and the rates (n, 3) that it turned by in them.
 
-    `gyro_radps`: of these cells and the one before (n + 1, 3).
-
-    Where it tells its attitude in one cell and in the one before, it has turned by what is between them: it has seen all
-    samples of its gyro, and of those few are told.
+    `gyro_radps`: of these cells and the one before (n + 1, 3). Where it tells its attitude in one cell and in the one before,
+    it has turned by what is between them: it has seen all samples of its gyro, and of those few may be told.
     """
     attitude, late_s = _last(told.series[ATTITUDE], first - 1, n + 1)
     attitude = product(attitude, turned_by(gyro_radps * np.nan_to_num(late_s)[:, None]))
     turned = product(attitude[:-1] * [1.0, -1.0, -1.0, -1.0], attitude[1:])
     rate = 2.0 / CELL_S * turned[:, 1:] * np.where(turned[:, :1] < 0.0, -1.0, 1.0)
-    is_told = ~np.isnan(rate[:, 0])
-    return attitude[1:], np.where(is_told[:, None], rate, gyro_radps[1:]), is_told
+    return attitude[1:], rate
 
 
 def _means(inertial: Series, first: int, n: int) -> Floats:

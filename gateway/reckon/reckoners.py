@@ -116,7 +116,15 @@ class Reckoners:
 
     def hearing(self, added: int, observations: Sequence[Observation]) -> Reckoners:
         """The same with what was told of motion; `added`: to its stamps for the session's time."""
-        return replace(self, waiting=(*self.waiting, (added, tuple(observations))))
+        told, waiting = tuple(observations), self.waiting
+        while waiting and waiting[-1][0] == added and len(waiting[-1][1]) <= len(told):
+            told, waiting = waiting[-1][1] + told, waiting[:-1]  # each part longer than the next: few, and seldom copied
+        return replace(self, waiting=(*waiting, (added, told)))
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing would happen however often it is advanced."""
+        return not (self.by_aircraft or self.waiting)
 
     def emptied(self) -> Reckoners:
         """The same without anything that is dated."""

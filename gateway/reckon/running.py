@@ -139,7 +139,7 @@ class _Slice:
     rate: Floats
     force: Floats
     unseen: Floats
-    is_told: Bools
+    turned: Floats
     attitude: Floats
     airspeed: Floats
     altitude: Floats
@@ -161,7 +161,7 @@ class _Slice:
             column("rate_radps"),
             column("force_mps2"),
             column("unseen")[:, -1],
-            np.asarray(column("is_told").all(axis=1)),
+            column("turned_radps"),
             column("attitude")[:, -1],
             _told_last(column("airspeed_mps")),
             _told_last(column("altitude_m")),
@@ -188,10 +188,9 @@ def _told_first(values: Floats, late_s: Floats) -> tuple[Floats, Floats]:
 def _through(tip: Tip, told: _Slice, kinds: Kinds, cell: int, unit: Unit, settings: DeadReckoning) -> Tip:
     """One block further."""
     before = tip.state.motion.velocity_mps[:, 0]
-    unseen = UNSEEN_SHARE * told.unseen[:, None]
-    wanders = np.where(told.is_told, settings.attitude_wanders, 0.0)
-    more = np.hypot(unseen[..., 3:], wanders[:, None, None]), unseen[..., :3]
-    state = dr.carried_through(tip.state, told.rate[:, None], told.force[:, None], CELL_S, unit, more)
+    rate, noise = _rates(told, settings)
+    more = noise[:, None], UNSEEN_SHARE * told.unseen[:, None, :3]
+    state = dr.carried_through(tip.state, rate[:, None], told.force[:, None], CELL_S, unit, more)
     accelerated = (state.motion.velocity_mps[:, 0] - before) / (BLOCK * CELL_S)
     end = cell + BLOCK
     state = _tied(state, told, kinds, end, settings)
@@ -210,6 +209,17 @@ def _through(tip: Tip, told: _Slice, kinds: Kinds, cell: int, unit: Unit, settin
         seeded[:, which] = end
         tip = replace(tip, state=with_hypothesis(tip.state, which, hypothesis(tip.state, 0)), seeded=seeded)
     return tip
+
+
+def _rates(told: _Slice, settings: DeadReckoning) -> tuple[Floats, Floats]:
+    """The rates that vehicles turned by (n, m, 3), and their noise in a root Hz (n, 3): their gyros', or their autopilots' if
+    these have seen more of them than has been told.
+    """
+    unseen = UNSEEN_SHARE * told.unseen[:, 3:]
+    is_told = ~np.isnan(told.turned).any(axis=(1, 2))
+    better = is_told & (np.sqrt(np.mean(unseen**2, axis=1)) > settings.attitude_wanders)
+    rate = np.where(better[:, None, None], told.turned, told.rate)
+    return rate, np.where(better[:, None], settings.attitude_wanders, unseen)
 
 
 def _tied(state: Reckoning, told: _Slice, kinds: Kinds, cell: int, settings: DeadReckoning) -> Reckoning:

@@ -120,10 +120,10 @@ class DeadReckoning:
     accelerometer_bias_wanders: float = 1e-3  # m/s2
     attitude_sigma_rad: float = math.radians(1.0)  # of an autopilot's roll and pitch; its heading is twice as bad
     attitude_wanders: float = math.radians(0.1)  # rad: what these errors change by
-    airspeed_sigma_mps: float = 0.7
-    sideslip_sigma_mps: float = 1.0
+    airspeed_sigma_mps: float = 1.5
+    sideslip_sigma_mps: float = 2.0
     wind_mps: float = 10.0  # before anything is known of it
-    wind_wanders: float = 0.15  # m/s
+    wind_wanders: float = 0.3  # m/s
     slip_mps: float = 0.2  # of wheels to the side
     altitude_sigma_m: float = 5.0  # of altitudes that are told beside positions
     ends_at_sigma_m: float = 300.0  # less sure than this it tells nothing
