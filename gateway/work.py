@@ -72,7 +72,7 @@ class Work(Reckoning):
                     self._reckon(at)
                     self._live_until(at)
                     yield at
-                is_idle = is_whole and not self.lanes.lanes and self.association.due is None
+                is_idle = is_whole and not self.lanes.lanes and self.association.due is None and self.reckoners.is_idle
                 for turn in Turn if is_idle else (at % SECOND // TURN_NS,):
                     self._in_turn(turn, at)
                 if at % SECOND == Turn.REGISTERING * TURN_NS:
