@@ -21,6 +21,7 @@ from bench.live_rates import live_rates
 from bench.lively import core_share, lateness
 from bench.measure import Figure, load, machine
 from bench.probing import probing
+from bench.reckoning import reckoning
 from bench.registration import registration
 from bench.replays import help_text, ten_hours, ten_minutes
 from bench.throughput import throughput
@@ -49,6 +50,7 @@ class Part(StrEnum):
     clutter = "clutter"
     registration = "registration"
     foretelling = "foretelling"
+    reckoning = "reckoning"
     probing = "probing"
     fleet = "fleet"
     memory = "memory"
@@ -121,6 +123,9 @@ def _measure(wanted: set[Part], runs: int, seconds: float, traffic_hours: int, c
         if Part.probing in wanted:
             say("the conflict probe of 1000 aircraft")
             figures += probing(2 * runs)
+        if Part.reckoning in wanted:
+            say("dead reckoning of one vehicle, and of a hundred")
+            figures += reckoning(runs)
         if Part.fleet in wanted:
             say("100 vehicles with two radars, and 1000 aircraft, live")
             figures += live_fleet(RATES_S)

@@ -62,7 +62,7 @@ class Believing(Making):
             return False
         off = fix.enu_m - self._enu_of(expected)
         ahead_s = abs(expected.ahead_s)
-        sigma_m = math.hypot(expected.level_sigma_m, expected.scatter_m, expected.wanders_m)
+        sigma_m = math.hypot(expected.level_sigma_m, expected.scatter_m)
         allowed_m = SURE_SIGMA * sigma_m + 0.5 * TURNED_MPS2 * ahead_s * ahead_s
         return math.hypot(float(off[0]), float(off[1])) > allowed_m
 

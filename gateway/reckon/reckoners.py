@@ -51,7 +51,7 @@ class Reckoned:
     longitude_rad: float
     height_m: float
     velocity_mps: Floats  # (3,)
-    sigma_m: Floats  # (3,)
+    sigma_m: Floats  # (3,) with what good position sources wander by, which it has followed
     velocity_sigma_mps: Floats  # (3,)
     wind_mps: Floats  # (2,) NaN = not known
     scatter_m: float  # of its position source, level, an axis
@@ -74,11 +74,6 @@ class Reckoned:
             readings.append(("wind found from, degrees", math.degrees(math.atan2(-east, -north)) % 360.0))
         denied = ("believed", "refused: they jumped", "refused: they walk off")[self.denied]
         return tuple(readings), (("positions", denied),)
-
-    @property
-    def wanders_m(self) -> float:
-        """By how much good position sources wander, level, an axis."""
-        return WANDERS_M
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,7 +113,10 @@ class Reckoners:
         """The same with what was told of motion; `added`: to its stamps for the session's time."""
         told, waiting = tuple(observations), self.waiting
         while waiting and waiting[-1][0] == added and len(waiting[-1][1]) <= len(told):
-            told, waiting = waiting[-1][1] + told, waiting[:-1]  # each part longer than the next: few, and seldom copied
+            told, waiting = (
+                waiting[-1][1] + told,
+                waiting[:-1],
+            )  # each part longer than the next: few, and seldom copied
         return replace(self, waiting=(*waiting, (added, told)))
 
     @property
@@ -322,7 +320,7 @@ def _reckoned(aircraft: str, tip: Tip, at: int) -> Reckoned:
         float(longitude),
         float(height),
         velocity,
-        np.sqrt(variance[:3] + variance[3:6] * ahead_s**2 + (0.5 * jerked * ahead_s) ** 2),
+        np.sqrt(variance[:3] + WANDERS_M**2 + variance[3:6] * ahead_s**2 + (0.5 * jerked * ahead_s) ** 2),
         np.sqrt(variance[3:6] + jerked**2),
         _wind_mps(tip),
         math.sqrt(float(tip.scatter_m2[0])),

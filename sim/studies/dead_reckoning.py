@@ -18,7 +18,7 @@ from gateway.estimators import inertial as ins
 from gateway.estimators import plane_reckoning as plane
 from gateway.estimators.inertial import Motion
 from sim.inertial import Errors, Ride, aeroplane, car, measured
-from sim.studies import Progress, Study, Table, silent
+from sim.studies import Progress, Study, Table, denial, silent
 
 Floats = NDArray[np.float64]
 
@@ -252,6 +252,7 @@ def run(runs: int = 20, seed: int = 1, *, rrd: Path | None = None, progress: Pro
             found[name][method] = reckon(of)
             done += 1
         tables.append(_table(name, found[name], figures))
+    tables.append(denial.table(runs, seed, figures, progress))
     if rrd is not None:
         from sim.studies.dead_reckoning_figures import draw
 
