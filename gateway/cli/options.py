@@ -58,6 +58,13 @@ class Registration(StrEnum):
     off = "off"
 
 
+class DeadReckoning(StrEnum):
+    """Whether vehicles that tell how they move go on by that without positions."""
+
+    on = "on"
+    off = "off"
+
+
 SiteOption = Annotated[
     Path | None,
     typer.Option(
@@ -115,6 +122,13 @@ RegistrationOption = Annotated[
         help="What radars measure too much: apply learns it and takes it off, watch only tells it, off does neither.",
     ),
 ]
+DeadReckoningOption = Annotated[
+    DeadReckoning,
+    typer.Option(
+        "--dead-reckoning",
+        help="By what vehicles tell of their own motion: on goes on by it without GPS and refuses positions that it denies.",
+    ),
+]
 KeyOption = Annotated[
     Path | None,
     typer.Option(
@@ -136,10 +150,11 @@ class Methods:
     weighting: WeightingOption = Weighting.bias
     association: AssociationOption = Association.default
     registration: RegistrationOption = Registration.apply
+    dead_reckoning: DeadReckoningOption = DeadReckoning.on
 
     def options(self) -> Options:
         """The options of a run."""
-        return choose(self.weighting, self.association, self.estimator, self.registration)
+        return choose(self.weighting, self.association, self.estimator, self.registration, self.dead_reckoning)
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,6 +236,7 @@ def choose(
     association: Association,
     estimator: Estimator = Estimator.kalman,
     registration: Registration = Registration.apply,
+    dead_reckoning: DeadReckoning = DeadReckoning.on,
 ) -> Options:
     """The options of a run."""
     from gateway.settings import Options
@@ -230,6 +246,7 @@ def choose(
         weighting=weighting.value,
         association=association.value,
         registration=registration.value,
+        dead_reckoning=dead_reckoning.value,
     )
 
 
@@ -253,6 +270,7 @@ def change(
     association: Association | None,
     estimator: Estimator | None = None,
     registration: Registration | None = None,
+    dead_reckoning: DeadReckoning | None = None,
 ) -> Options:
     """The options with what was asked for in place of what was archived."""
     from dataclasses import replace
@@ -265,4 +283,6 @@ def change(
         options = replace(options, estimator=estimator.value)
     if registration is not None:
         options = replace(options, registration=registration.value)
+    if dead_reckoning is not None:
+        options = replace(options, dead_reckoning=dead_reckoning.value)
     return options

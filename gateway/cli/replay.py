@@ -140,10 +140,19 @@ class Methods:
             show_default=False,
         ),
     ] = None
+    dead_reckoning: Annotated[
+        take.DeadReckoning | None,
+        typer.Option(
+            "--dead-reckoning",
+            help="Whether vehicles go on by what they tell of their own motion. (default: the session's, else on)",
+            show_default=False,
+        ),
+    ] = None
 
     def change(self, options: Options) -> Options:
         """The options with what was asked for in place of what was archived."""
-        return take.change(options, self.weighting, self.association, self.estimator, self.registration)
+        chosen = (self.weighting, self.association, self.estimator, self.registration, self.dead_reckoning)
+        return take.change(options, *chosen)
 
 
 def register(app: typer.Typer) -> None:
