@@ -16,7 +16,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.estimators.track_splitting_bank import Bank, begun, bounded, carried, distinct, likeliest, merged
+from gateway.estimators.track_splitting_bank import (
+    Bank,
+    begun,
+    bounded,
+    carried,
+    distinct,
+    likeliest,
+    merged,
+    without_plots,
+)
 from gateway.estimators.track_splitting_gates import near
 from gateway.estimators.track_splitting_plots import Sight, along, corrected, spread
 from gateway.estimators.track_splitting_shares import shared
@@ -104,9 +113,10 @@ class _Pairs:
 @made_swiftly
 @dataclass(frozen=True, slots=True)
 class _Looked:
-    """Which families (f,) a look told of, True = all; and since when each is next looked at."""
+    """Which families (f,) a look told of, True = all; how many they were missed in before; and since when the next is due."""
 
     told: Bools | bool
+    missed: Ints | None  # None = none in any
     at: Ints  # ns
 
 
@@ -128,9 +138,11 @@ def scan(
     """The bank after one look at an instant (ns). What it costs follows the number of pairs of hypothesis and plot.
 
     Plots need not be of that very instant. `period_s`: what comes is a piece of a scan that takes so long. Then it tells of a
-    family that has a plot in it and was not looked at for half of that, or that was not for one and a half.
+    family that has a plot in it and was not looked at for half of that, or that was not for one and a half. Of a time without
+    any piece only one scan is thought to have been.
     """
-    bank = carried(bank, at, model.acceleration_density)
+    silent = 0 if period_s is None else max(at - bank.at - round(period_s * SECOND), 0)
+    bank = carried(bank, at, model.acceleration_density, silent)
     may = None if period_s is None else at - bank.looked >= 0.5 * period_s * SECOND
     pairs = _paired(bank, plots, sight, model.detection, may)
     looked = _looked(bank, pairs, period_s)
@@ -189,12 +201,14 @@ def _looked(bank: Bank, pairs: _Pairs, period_s: float | None) -> _Looked:
     """A whole scan tells of all; a piece of one of the families that have a plot in it, or were not looked at for too long."""
     families = len(bank.number)
     if period_s is None:
-        return _Looked(True, np.full(families, bank.at))
+        return _Looked(True, None, np.full(families, bank.at))
     with_plots = np.zeros(families, np.bool_)
     with_plots[pairs.family] = True
-    overdue = bank.at - bank.looked >= 1.5 * period_s * SECOND
+    since = (bank.at - bank.looked) / (period_s * SECOND)
+    overdue = since >= 1.5
+    missed = np.where(with_plots & overdue, np.rint(since).astype(np.int64) - 1, 0)
     missed_at = bank.looked + np.where(overdue, round(period_s * SECOND), 0)
-    return _Looked(with_plots | overdue, np.where(with_plots, bank.at, missed_at))
+    return _Looked(with_plots | overdue, missed if missed.any() else None, np.where(with_plots, bank.at, missed_at))
 
 
 def _weighed(bank: Bank, pairs: _Pairs, looked: _Looked, plots: int, model: Splitting) -> _Weighed:
@@ -208,6 +222,9 @@ def _weighed(bank: Bank, pairs: _Pairs, looked: _Looked, plots: int, model: Spli
         by_edge = np.asarray(np.bincount(edge, evidence, minlength=len(key)))
         family, plot = np.divmod(key, max(plots, 1))
     before = model.survival * bank.existence
+    if looked.missed is not None:
+        before *= (1.0 - IN_GATE * model.detection) ** looked.missed
+        before /= 1.0 - model.survival * bank.existence + before
     missed = before * (1.0 - IN_GATE * model.detection * looked.told)
     none = 1.0 - before + missed
     chance, nothing, unexplained, contested = shared(family, plot, before.take(family) * by_edge, none, plots)
@@ -232,6 +249,8 @@ def _split(bank: Bank, pairs: _Pairs, weighed: _Weighed, looked: _Looked, serial
     parent = np.concatenate([every, pairs.row]).take(some)
     newest = np.concatenate([np.zeros(parents, np.int64), serial.take(pairs.plot)]).take(some)
     path = np.concatenate([newest[None], bank.path[:-1].take(parent, axis=1)])
+    if looked.missed is not None:
+        path = without_plots(path, looked.missed.take(family))
     if not isinstance(looked.told, bool):
         path = np.where(looked.told.take(family), path, bank.path.take(parent, axis=1))
     grown = Bank(
@@ -244,7 +263,7 @@ def _split(bank: Bank, pairs: _Pairs, weighed: _Weighed, looked: _Looked, serial
         existence,
         bank.first,
         bank.number,
-        bank.looks + looked.told,
+        bank.looks + looked.told + (0 if looked.missed is None else looked.missed),
         bank.confirmed | (existence >= model.confirm_at),
         looked.at,
     )

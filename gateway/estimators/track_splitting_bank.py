@@ -64,8 +64,8 @@ class Bank:
         return np.stack([np.bincount(self.family, self.weight * axis, minlength=len(self.number)) for axis in position])
 
 
-def carried(bank: Bank, at: int, density: tuple[float, ...]) -> Bank:
-    """The same at another instant, ns: see `moved`."""
+def carried(bank: Bank, at: int, density: tuple[float, ...], silent: int = 0) -> Bank:
+    """The same at another instant, ns: see `moved`. For some of that time, ns, the sensor looked nowhere."""
     mean, covariance = moved(bank.mean, bank.covariance, (at - bank.at) / SECOND, density)
     return Bank(
         at,
@@ -79,7 +79,7 @@ def carried(bank: Bank, at: int, density: tuple[float, ...]) -> Bank:
         bank.number,
         bank.looks,
         bank.confirmed,
-        bank.looked,
+        bank.looked + silent if silent else bank.looked,
     )
 
 
@@ -119,6 +119,14 @@ def likeliest(weight: Floats, family: Ints, keep: Bools, most: int) -> Ints:
     if (family[most:] == family[:-most]).any():
         some = some[rank(family) < most]
     return some
+
+
+def without_plots(path: Ints, looks: Ints) -> Ints:
+    """Paths (PATH, n) where so many looks (n,) before the newest had no plot."""
+    place = np.arange(len(path))[:, None]
+    earlier = np.maximum(place - looks, 0)
+    shifted = np.take_along_axis(path, earlier, axis=0)
+    return np.where(place == 0, path, np.where(place <= looks, 0, shifted))
 
 
 def rank(family: Ints) -> Ints:

@@ -76,9 +76,9 @@ def worked_slice(
     for family in now.tolist():
         name, path = int(bank.number[family]), bank.path[:, best[family]].tolist()
         if name in was:
-            if int(bank.looks[family]) == looked.get(name):
+            if int(bank.looks[family]) == looked[name]:
                 continue
-            looks += 1
+            looks += int(bank.looks[family]) - looked[name]
             hits += path[0] > 0
             path = path[:1]
         fresh |= {one: name for one in path if one and one not in told}

@@ -240,3 +240,26 @@ def test_a_scan_in_pieces_counts_as_one_look() -> None:
     assert bank.confirmed.tolist() == [True]
     assert looks[-1] == 10
     assert bank.path[:4, bank.best[0]].tolist() == [371, 331, 0, 0]
+
+
+def test_a_scan_that_comes_at_once_and_misses_a_target_counts() -> None:
+    """Every third scan has clutter alone: the family was looked at in all of them, and its path tells which had no plot."""
+    bank = Bank.empty(0, 2)
+    for place in range(17):
+        value = [[-9000.0, 5000.0 * (-1) ** place], *([[180.0 * place, 0.0]] if place % 3 != 2 else [])]
+        at = round(6.0 * place * SECOND)
+        bank, _ = scan(bank, plots(value, 6.0 * place, 10 * place + 1), at, Plane(), MODEL, 6.0)
+    family = int(np.flatnonzero(bank.confirmed)[0])
+    assert bank.looks[family] == 17
+    assert bank.path[:, bank.best[family]].tolist() == [162, 152, 0, 132, 122, 0, 102, 92]
+
+
+def test_a_scan_that_never_came_is_not_held_against_a_target() -> None:
+    """After a silence of ten scans a track goes on as sure as before; one that was seen by, and missed in, is not."""
+    bank = worked([[[180.0 * place, 0.0]] for place in range(8)])
+    here = plots([[180.0 * 18, 0.0]], 108.0, 100)
+    silent, _ = scan(replace(bank, at=42 * SECOND), here, 108 * SECOND, Plane(), MODEL, 6.0)
+    seen = replace(bank, at=102 * SECOND, mean=moved(bank.mean, bank.covariance, 60.0, (1.0, 1.0))[0])
+    missed, _ = scan(seen, here, 108 * SECOND, Plane(), MODEL, 6.0)
+    assert silent.existence[0] > 0.999
+    assert bank.number[0] not in missed.number

@@ -13,6 +13,7 @@ from gateway import pipeline
 from gateway.observation import Heard, Observation, RadarPlot
 from gateway.settings import SiteError, format_site, parse_site, with_radar
 from gateway.track import FIRST_OWN
+from gateway.track.density import FIRST_DETECTION
 
 Differences = Callable[[dict[Any, dict[str, Any]], dict[Any, dict[str, Any]]], float]
 
@@ -208,6 +209,21 @@ def test_of_a_radar_that_does_not_say_how_often_it_scans_nothing_is_tracked(worl
     said = ran.said("add period_s to its [[radar]]")
     assert len(said) == 1
     assert said[0].at >= world.at(20.0)
+
+
+def test_clutter_is_learnt_from_the_scans(scanning: Any) -> None:
+    """Where nothing is said of it: after 25 scans of twelve clutter plots each, twelve are expected."""
+    ran = scanning.run(scattered(scanning, 10.0, 12))
+    assert ran.state.unnumbered.watches[1].newest[1].counts.sum() == pytest.approx(12.0, rel=0.25)
+
+
+def test_detection_is_learnt_from_the_scans(scanning: Any) -> None:
+    """A target that is seen in every scan raises what is expected of the next, one that is missed in one of three lowers it."""
+    flight, learnt = bare(scanning.flight(seconds=16.0, aircraft=None)), []
+    for said in (flight, [one for place, one in enumerate(flight) if place % 3]):
+        ran = scanning.run([*said, *scattered(scanning, 16.0, 2)])
+        learnt.append(ran.state.unnumbered.watches[1].newest[1].detection)
+    assert learnt[0] > FIRST_DETECTION > learnt[1] + 0.02
 
 
 def test_birds_are_followed_and_not_told(scanning: Any) -> None:
