@@ -12,9 +12,10 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from gateway.observation import Heard, ImuSample, Many
+from gateway.observation import Attitude, Heard, ImuSample, Many
 from gateway.picture import Picture
 from gateway.pipeline import State, initial, step
+from gateway.reckon.reckoners import Reckoners
 from gateway.reckon.told import Series, portioned
 from gateway.settings import DeadReckoning, Options, Runway, Site
 from sim.inertial import aeroplane, car
@@ -234,6 +235,18 @@ def test_what_was_received_at_an_instant_or_later_waits_for_the_next() -> None:
     portion, later = portioned(samples, until)
     assert len(portion["mavlink:1"][0].at) == 5
     assert sum(len(one) for one in later if isinstance(one, Many)) == 10
+
+
+def test_what_waits_one_by_one_keeps_its_order_and_is_few_parts() -> None:
+    """Tens of thousands a second come one by one before the session's time has settled: the parts must not be copied for each."""
+    reckoners = Reckoners()
+    for number in range(1000):
+        reckoners = reckoners.hearing(
+            SECOND if number >= 900 else 0, [Attitude("mavlink:1", number, number, 0.0, 0.0, 0.0)]
+        )
+    assert len(reckoners.waiting) <= 20
+    said = [(added, one.received_at) for added, some in reckoners.waiting for one in some]
+    assert said == [(SECOND if number >= 900 else 0, number) for number in range(1000)]
 
 
 def test_a_vehicle_without_an_inertial_unit_is_nothing_to_dead_reckoning() -> None:
