@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 UNKNOWN = -(1 << 62)
+GUSTS_AT_FIRST = 0.2  # m2/s2
 LEARNT, KEPT = 4, 5  # the first horizons, of each of which so many predictions are kept until they come due
 NOT_KEPT = 1 << 62
 NOBODY: Mapping[int, int] = MappingProxyType({})
@@ -33,6 +34,7 @@ class Minds:
     wander: Floats  # (n,) mean square of what the speed changes by in a second, faded; NaN = not known yet
     unsettled: Floats  # (n,) radians that it turned by lately, faded
     cruise: Floats  # (n,) speed through the air that it keeps, m/s; NaN = not known yet
+    gusts: Floats  # (n,) mean square of what its speed through the air is off that, on straights, faded
     turned: Floats  # (n,) radians that it turned by since it was first thought of
     agreed: Floats  # (n, c), `intent.Seen`
     length: Floats  # (n,)
@@ -62,6 +64,7 @@ class Minds:
             np.full(n, math.nan),
             zero,
             np.full(n, math.nan),
+            np.full(n, GUSTS_AT_FIRST),
             zero,
             seen.agreed,
             seen.length,

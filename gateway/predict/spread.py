@@ -23,19 +23,15 @@ ALONG_POINTS, ENDS_LANDED, ENDS_ROUND, ROUND_A_POINT, BY_MODEL = range(5)
 
 # How early or late it is on a way along points, seconds: a share of the time, more for each radian of turns on the way and for
 # each radian that it turned lately, and where it is to fly slower. Beside the way: autopilots wander about a line, swing over
-# after a turn, and more while they are in one. What is a share of speed or time holds for a boat of 5 m/s as well.
-CRUISE, LATE_A_TURN, LATE_IN_TURN, LATE_SLOWER, LATE_LANDED_S = 0.005, 0.43, 0.33, 0.05, 2.0
-RESTS, ROUNDS, GOES_ANYWHERE = (
-    (0.2, 0.0),
-    (0.25, 0.25),
-    (1.2, 0.7),
-)  # of speed: along and across, past the end of the way
-WANDERS_S, WANDERS_FOR_S, WANDERS_A_TURN = 0.116, 40.0, 0.03
-SWINGS, SWINGS_NOW, SWINGS_FOR_S = 0.49, 2.05, 4.0
-SPEED_KEPT, ACCELERATES_S = (
-    0.32,
-    1.7,
-)  # shares of the filter's sigma of speed and of the acceleration now, over all the way
+# after a turn, and more while they are in one. What turns bring is a share of the time in which a turn goes through a radian.
+CRUISE, LATE_A_TURN, LATE_IN_TURN, LATE_SLOWER, LATE_LANDED_S = 0.005, 0.106, 0.08, 0.05, 2.0
+# along and across, shares of speed, past the end of the way: it has landed, it circles, nobody knows
+RESTS, ROUNDS, GOES_ANYWHERE = (0.2, 0.0), (0.25, 0.25), (1.2, 0.7)
+WANDERS_S, WANDERS_FOR_S, WANDERS_A_TURN = 0.116, 40.0, 0.0075
+SWINGS, SWINGS_NOW, SWINGS_FOR_S = 0.12, 0.5, 4.0
+ACCELERATES_S = 1.7  # who changes its speed goes on doing so for this long
+# of the mean square of gusts: how far off the speed that is kept is, and for how many seconds what comes lasts, twice
+CRUISE_OFF, GUST_LASTS_S = 0.3, 10.0
 ON_LINE_RAD = 0.3  # who has turned by more flies along a line between two points
 SETTLES_S = 10.0  # after a turn
 EARLY_S, EARLY = 2.0, 0.06  # how much earlier and later the way is looked at
@@ -86,21 +82,25 @@ def spread(
     speed, kind = now.speed[:, None], kinds[:, None]
     by_model, lands, rounds = kind == BY_MODEL, kind == ENDS_LANDED, kind == ENDS_ROUND
     turned, over = whole.turned[:, :h], whole.over_s[:, :h]
-    lately, in_turn = turned - whole.turned[:, 3 * h :], now.unsettled[:, None]
+    radian_s = 1.0 / now.turning[:, None]
+    turns_s, lately_s = turned * radian_s, (turned - whole.turned[:, 3 * h :]) * radian_s
+    in_turn_s = now.unsettled[:, None] * radian_s
     ends_along, ends_across = (
         np.where(lands, RESTS[axis], np.where(rounds, ROUNDS[axis], GOES_ANYWHERE[axis])) * over for axis in (0, 1)
     )
-    late = (CRUISE * t) ** 2 + (LATE_A_TURN * turned) ** 2 + (LATE_IN_TURN * in_turn) ** 2
+    late = (CRUISE * t) ** 2 + (LATE_A_TURN * turns_s) ** 2 + (LATE_IN_TURN * in_turn_s) ** 2
     late = late + (LATE_SLOWER * whole.slower_s[:, :h]) ** 2 + np.where(lands & (over > 0.0), LATE_LANDED_S**2, 0.0)
     late = late + ends_along * ends_along
     wanders = WANDERS_S**2 * np.where(turned > ON_LINE_RAD, 1.0, 2.0 * (1.0 - np.exp(-t / WANDERS_FOR_S)))
-    swings = (SWINGS * lately) ** 2 + (SWINGS_NOW * in_turn) ** 2 * np.exp(-t / SWINGS_FOR_S)
-    beside_s = wanders + swings + (WANDERS_A_TURN * turned) ** 2 + ends_across * ends_across
+    swings = (SWINGS * lately_s) ** 2 + (SWINGS_NOW * in_turn_s) ** 2 * np.exp(-t / SWINGS_FOR_S)
+    beside_s = wanders + swings + (WANDERS_A_TURN * turns_s) ** 2 + ends_across * ends_across
     doubt = np.maximum(DOUBTED - np.nan_to_num(confidence, nan=DOUBTED), 0.0)[:, None]
     unknown = MANOEUVRES * speed * speed * np.where(by_model, 1.0, doubt) * t**3
     place = place_sigma[:, None] ** 2 + np.where(kind == ROUND_A_POINT, (0.25 * speed * t) ** 2, 0.0)
-    gains = (SPEED_KEPT * now.speed_sigma[:, None]) ** 2 + (ACCELERATES_S * now.acceleration[:, None]) ** 2
-    by_points = speed * speed * late + _of_wind(now, whole, t, wind_mps)
+    gains = (ACCELERATES_S * now.acceleration[:, None]) ** 2 + np.where(
+        by_model, now.speed_sigma[:, None] ** 2, CRUISE_OFF * now.gusts[:, None]
+    )
+    by_points = speed * speed * late + _of_wind(now, whole, t, wind_mps) + GUST_LASTS_S * now.gusts[:, None] * t
     along = place + gains * t * t + np.where(by_model, 0.0, by_points) + unknown / 6.0
     drifts = np.where(
         by_model, (now.speed_sigma[:, None] * t) ** 2, speed * speed * beside_s + _to_side(whole, t) * late

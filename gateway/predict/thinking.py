@@ -29,7 +29,7 @@ WANDER_MEMORY_S = 20.0
 WANDERS_LESS = 3.0  # a filter's velocity is wrong by no more than so often what it changes by in a second
 SURE_AT_MOST = 0.25  # but by no less than this share of what the filter says
 TURNS_RAD = 0.25  # who has turned by more lately is in a turn, or just out of one
-CRUISE_S, CRUISE_IN_TURN_S = 6.0, 60.0  # for how long a speed is remembered
+CRUISE_S, CRUISE_IN_TURN_S, GUSTS_S = 10.0, 60.0, 40.0  # for how long a speed is remembered, and how it moves about
 ANOTHER_CRUISE = 0.12  # who flies straight and is faster or slower by such a share has taken up another speed
 UNSETTLED_S = 8.0  # how long a turn is felt
 
@@ -56,6 +56,7 @@ class Motions:
     speed_sigma: Floats  # of the velocity, m/s: the filter's, or less where the speed hardly moves about
     unsettled: Floats  # radians that it turned by lately
     cruise: Floats  # speed through the air that it keeps
+    gusts: Floats  # mean square of what it is off that on straights
     turned: Floats  # radians that it has turned by since it was first thought of
 
 
@@ -101,7 +102,8 @@ def motions(
     turned = np.where(fresh | slow, 0.0, np.abs(wrap_rad(course - before.courses[:, 0])))
     turned = turned**3 / np.maximum(turned * turned + (2.0 * course_sigma) ** 2, 1e-12)  # as far as it is no noise
     unsettled = np.where(fresh, 0.0, before.unsettled * np.exp(-period_s / UNSETTLED_S)) + turned
-    cruise, all_turned = _cruise(before, air_speed, unsettled, fresh, period_s), before.turned + turned
+    cruise, gusts = _cruise(before, air_speed, unsettled, fresh, period_s)
+    all_turned = before.turned + turned
     minds = replace(
         before,
         at=np.full(len(speed), at),
@@ -111,6 +113,7 @@ def motions(
         wander=wander,
         unsettled=unsettled,
         cruise=cruise,
+        gusts=gusts,
         turned=all_turned,
     )
     turn_rate, sure = np.where(side == 0, 0.0, rate), np.clip(steady, SURE_AT_MOST * velocity_sigma, velocity_sigma)
@@ -127,20 +130,28 @@ def motions(
             sure,
             unsettled,
             cruise,
+            gusts,
             all_turned,
         ),
         minds,
     )
 
 
-def _cruise(before: Minds, air_speed: Floats, unsettled: Floats, fresh: Bools, period_s: Floats) -> Floats:
-    """The speed (n,) through the air that is kept: in a turn it is what it was before, since turns slow down or speed up."""
+def _cruise(
+    before: Minds, air_speed: Floats, unsettled: Floats, fresh: Bools, period_s: Floats
+) -> tuple[Floats, Floats]:
+    """The speed (n,) through the air that is kept, and the mean square of what it is off that.
+
+    In a turn it is what it was before, since turns slow down or speed up.
+    """
     turns = unsettled > TURNS_RAD
     known = ~(fresh | np.isnan(before.cruise) | (before.speed < LEAST_SPEED_MPS))
     kept = np.where(known, before.cruise, air_speed)
     other = ~turns & (np.abs(air_speed - kept) > ANOTHER_CRUISE * kept)
     keep = np.where(other, 0.0, np.exp(-period_s / np.where(turns, CRUISE_IN_TURN_S, CRUISE_S)))
-    return np.asarray(keep * kept + (1.0 - keep) * air_speed)
+    slowly = np.where(known & ~turns & ~other, np.exp(-period_s / GUSTS_S), 1.0)
+    gusts = slowly * before.gusts + (1.0 - slowly) * (air_speed - kept) ** 2
+    return np.asarray(keep * kept + (1.0 - keep) * air_speed), gusts
 
 
 def _wander(before: Minds, speed: Floats, fresh: Bools, period_s: Floats) -> Floats:

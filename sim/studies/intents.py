@@ -68,6 +68,7 @@ VARIANTS: tuple[tuple[str, modes.Rule, Rule, Feedback], ...] = (
     ("literal", "literal", "literal", "none"),
     ("default", "rmimm", "default", "inferred"),
     ("known point", "rmimm", "default", "known"),
+    ("literal, known point", "literal", "literal", "known"),
 )
 
 

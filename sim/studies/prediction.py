@@ -24,7 +24,10 @@ from sim.studies.intents import (
     rms_m,
     variant,
 )
+from sim.studies.prediction_honesty import honesty
 from sim.studies.rmimm import Flight
+
+MISSION_EACH, MISSIONS_AT_MOST = 25, 12  # of so many runs; each is flown for ten minutes
 
 
 def run(runs: int = 200, seed: int = 1, *, rrd: Path | None = None, progress: Progress = silent) -> Study:
@@ -38,6 +41,10 @@ def run(runs: int = 200, seed: int = 1, *, rrd: Path | None = None, progress: Pr
     progress("predictions", 0.7)
     figures: dict[str, float] = {}
     tables = (_intents(found, figures), _filters(found, flown, figures), *_predictions(found, flown, points, figures))
+    progress("missions", 0.8)
+    sigmas, within = honesty(max(min(runs // MISSION_EACH, MISSIONS_AT_MOST), 1), seed)
+    figures |= within
+    tables = (*tables, sigmas)
     if rrd is not None:
         from sim.studies.prediction_figures import draw
 
@@ -74,7 +81,7 @@ def _filters(found: Mapping[str, Followed], flown: Flight, figures: dict[str, fl
 
 FED = (
     "RMIMM: the default filter without intent; default: with the inferred point fed back; known point: with the true one",
-    "literal: the printed filter and the printed inference",
+    "literal: the printed filter and the printed inference; literal, known point: with the true one fed back to it",
 )
 WHERE: dict[Origins, str] = {
     "turns": "from inside the turns, from 10 s on",
