@@ -20,6 +20,34 @@ PROGRAM = Path(sys.executable).with_name("talkdown")
 REGISTERED = ["aircraft=10", "radars=2", "duration_s=420", "gps.error_sigma_m=10"]
 REGISTERED += ["radar1.range_error_m=150", "radar1.azimuth_error_deg=0.5", "radar1.elevation_error_deg=0.2"]
 REGISTERED += ["radar1.time_error_s=0.05", "radar2.range_error_m=-40", "radar2.azimuth_error_deg=-0.2"]
+MAX = ("--speed", "max", "--archive")
+SCENE = ("--size", "2000x1200", "--view", "Demo field: approach")
+PUBLISHED = """
+name = "Demo field"
+[runway]
+latitude_deg = 31.0
+longitude_deg = 104.0
+height_m = 500.0
+geoid_separation_m = -35.0
+landing_direction_deg = 90.0
+[[waypoint]]
+name = "FAF"
+latitude_deg = 31.0
+longitude_deg = 103.86
+[[waypoint]]
+name = "ALPHA"
+latitude_deg = 31.06
+longitude_deg = 103.75
+[[waypoint]]
+name = "BRAVO"
+latitude_deg = 30.93
+longitude_deg = 103.8
+[[weather]]
+name = "CB 1"
+latitude_deg = 31.005
+longitude_deg = 103.76
+radius_m = 3000.0
+"""
 SCOPE = "Precision approach: elevation over azimuth, x10"
 
 
@@ -60,6 +88,15 @@ def main() -> None:
         draw(
             only_session(work / "registered") / "session.rrd", "registration", "--at", "0.97", "--page", "Registration"
         )
+        few = ("--set", "radars=0", "--set", "gps.period_s=1")
+        talkdown("simulate", "conflicts", "--set", "aircraft=10", "--set", "duration_s=420", *few, *MAX, work / "near")
+        talkdown("replay", only_session(work / "near"), "--viewer", "none", "--archive", work / "told")
+        draw(only_session(work / "told") / "session.rrd", "conflict", "--at", "0.64", *SCENE)
+        published = work / "published.toml"
+        published.write_text(PUBLISHED, encoding="utf-8")
+        talkdown("simulate", "approach", "--site", published, *few, *MAX, work / "one")
+        talkdown("replay", only_session(work / "one"), "--viewer", "none", "--archive", work / "believed")
+        draw(only_session(work / "believed") / "session.rrd", "candidates", "--at", "0.3", *SCENE)
         site = work / "field.toml"
         site.write_text(talkdown("site", FLIGHT), encoding="utf-8")
         talkdown("simulate", "radar", "--watch", FLIGHT, "--site", site, "--archive", work / "seen")

@@ -25,6 +25,7 @@ class BelievedScene:
 
     def __init__(self, site: Site) -> None:
         self._frame, self._units = RunwayFrame(site.runway), style.units_of(site)
+        self._published = {waypoint.name for waypoint in site.waypoints}
         self._shown: dict[str, int] = {}  # by path, the track
 
     def entries(self, pictures: Sequence[Picture]) -> list[Entry]:
@@ -44,7 +45,7 @@ class BelievedScene:
             now = told.time == at
             for track in tracks:
                 rows = np.flatnonzero(now & (told.track == track)).tolist()
-                labels = [f"{told.name[row]} {100.0 * told.weight[row]:.0f} %" for row in rows]
+                labels = [self._candidate(told.name[row], float(told.weight[row])) for row in rows]
                 yield from self._row(
                     entity("predict", track, "candidates"), track, at, step, told.places_m[rows], labels
                 )
@@ -59,6 +60,10 @@ class BelievedScene:
                 yield from self._row(
                     entity("predict", track, "gates"), track, at, step, places, [label] if rows else []
                 )
+
+    def _candidate(self, name: str, weight: float) -> str:
+        """A published point has its name from the site: the weight stands below it."""
+        return f"\n{100.0 * weight:.0f} %" if name in self._published else f"{name} {100.0 * weight:.0f} %"
 
     def _alert(self, kind: str, off: float) -> str:
         if kind == "too fast":
