@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,20 +13,34 @@ from numpy.typing import NDArray
 from gateway.estimators.track_splitting import Plots
 
 Floats = NDArray[np.float64]
+Known = tuple[Floats, int]  # states (4, n) of targets at an instant, ns: x, y and their rates
 Tracker = Callable[[Plots, int], tuple[Floats, float]]  # a scan and its instant, ns: positions (2, e), and CPU seconds
 
 DENSITY, SIGMA_M, DETECTION, SPEED_SIGMA_MPS = 1.0, 50.0, 0.9, 30.0
+KNOWN_SPEED_SIGMA_MPS = 5.0  # of a track that has been followed for a while
 MISSED_DISTANCE = 3.72  # the gate of 0.999 in two components
 GREATEST_DISTANCE_M, NEIGHBOURS = 1000.0, 5  # of the kd-tree; 180 m in a scan, and what 30 m/s more would be
 # What gives Stone Soup's trackers their least GOSPA in these scenes:
 BEGINS_AFTER, HELD_FOR, ENDS_AFTER = 4, 2, 4  # plots; scans without one, before and after that
 
 
-def ours(clutter: float) -> Tracker:
-    """Track splitting; `clutter` plots a scan and square metre come with the plots."""
+def ours(clutter: float, known: Known | None = None) -> Tracker:
+    """Track splitting; `clutter` plots a scan and square metre come with the plots.
+
+    Where targets are told beforehand they are confirmed tracks, and it goes on finding others, as it always does.
+    """
+    from gateway.estimators.track_splitting import Bank
+    from gateway.estimators.track_splitting_bank import begun
     from sim.studies.clutter_sides import shipped
 
-    tracker = shipped()
+    bank = None
+    if known is not None:
+        state, since = known
+        count = state.shape[1]
+        scatter = np.repeat(np.diag([SIGMA_M**2] * 2 + [KNOWN_SPEED_SIGMA_MPS**2] * 2)[:, :, None], count, axis=2)
+        bank = begun(Bank.empty(since, 2), state, scatter, -np.arange(1, count + 1), np.ones(count))
+        bank = replace(bank, confirmed=np.ones(count, np.bool_))
+    tracker = shipped(bank=bank)
 
     def scan(plots: Plots, at: int) -> tuple[Floats, float]:
         began = time.process_time()
@@ -35,7 +50,7 @@ def ours(clutter: float) -> Tracker:
     return scan
 
 
-def joint(clutter: float) -> Tracker:
+def joint(clutter: float, known: Known | None = None) -> Tracker:
     """Stone Soup's JPDA (with loopy belief propagation: the one that does not count joint hypotheses one by one)."""
     from stonesoup.dataassociator.probability import JPDAwithLBP
     from stonesoup.hypothesiser.probability import PDAHypothesiser
@@ -45,28 +60,15 @@ def joint(clutter: float) -> Tracker:
     hypothesiser = PDAHypothesiser(
         parts.predictor, parts.updater, clutter, prob_detect=DETECTION, prob_gate=0.999, include_all=False
     )
-    return parts.tracker(MultiTargetMixtureTracker, JPDAwithLBP(hypothesiser))
+    return parts.tracker(MultiTargetMixtureTracker, JPDAwithLBP(hypothesiser), known)
 
 
-def joint_of_known(clutter: float, state: Floats, at: int) -> Tracker:
-    """The same from known tracks, (4, n) of x, y and their rates at an instant, ns: nothing begins and nothing ends."""
-    from stonesoup.dataassociator.probability import JPDAwithLBP
-    from stonesoup.hypothesiser.probability import PDAHypothesiser
-    from stonesoup.tracker.simple import MultiTargetMixtureTracker
-
-    parts = _Parts()
-    hypothesiser = PDAHypothesiser(
-        parts.predictor, parts.updater, clutter, prob_detect=DETECTION, prob_gate=0.999, include_all=False
-    )
-    return parts.tracker(MultiTargetMixtureTracker, JPDAwithLBP(hypothesiser), (state, at))
-
-
-def nearest(clutter: float) -> Tracker:
+def nearest(clutter: float, known: Known | None = None) -> Tracker:
     """Stone Soup's global nearest neighbour behind a kd-tree."""
     from stonesoup.tracker.simple import MultiTargetTracker
 
     parts = _Parts()
-    return parts.tracker(MultiTargetTracker, parts.nearest())
+    return parts.tracker(MultiTargetTracker, parts.nearest(), known)
 
 
 class _Parts:
@@ -99,7 +101,7 @@ class _Parts:
             max_distance=GREATEST_DISTANCE_M,
         )
 
-    def tracker(self, kind: Any, associator: Any, known: tuple[Floats, int] | None = None) -> Tracker:
+    def tracker(self, kind: Any, associator: Any, known: Known | None = None) -> Tracker:
         """A whole tracker, fed scan by scan; with what is known at an instant it finds nothing and ends nothing."""
         from datetime import UTC, datetime, timedelta
 
@@ -129,8 +131,9 @@ class _Parts:
         else:
             made = kind(_Nobody(), UpdateTimeStepsDeleter(10**9), detections(), associator, self.updater)
             since = begin + timedelta(seconds=known[1] / 1e9)
+            sure = np.diag([SIGMA_M**2, KNOWN_SPEED_SIGMA_MPS**2] * 2)
             made._tracks = {
-                Track([GaussianState(one, prior.covar, timestamp=since)]) for one in known[0].T[:, [0, 2, 1, 3], None]
+                Track([GaussianState(one, sure, timestamp=since)]) for one in known[0].T[:, [0, 2, 1, 3], None]
             }
         each = iter(made)
 
@@ -154,4 +157,8 @@ class _Nobody:
         return set()
 
 
-SIDES: dict[str, Callable[[float], Tracker]] = {"ours": ours, "JPDA": joint, "nearest neighbour, kd-tree": nearest}
+SIDES: dict[str, Callable[[float, Known | None], Tracker]] = {
+    "ours": ours,
+    "JPDA": joint,
+    "nearest neighbour, kd-tree": nearest,
+}

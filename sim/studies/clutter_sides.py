@@ -37,18 +37,21 @@ class Seen:
 Tracker = Callable[[Plots, int], Seen]
 
 
-def shipped(model: Splitting = Splitting(DENSITY, GREATEST_SPEED_MPS)) -> Tracker:
-    """The default: `gateway.estimators.track_splitting`. It tells its confirmed families, by the mean of their hypotheses."""
-    bank = Bank.empty(0, 2)
+def shipped(model: Splitting = Splitting(DENSITY, GREATEST_SPEED_MPS), bank: Bank | None = None) -> Tracker:
+    """The default: `gateway.estimators.track_splitting`. It tells its confirmed families, by the mean of their hypotheses.
+
+    `bank`: what is known beforehand, None = nothing.
+    """
+    known = Bank.empty(0, 2) if bank is None else bank
 
     def after(plots: Plots, at: int) -> Seen:
-        nonlocal bank
+        nonlocal known
         began = time.perf_counter()
-        bank, _ = scan(bank, plots, at, Plane(), model)
+        known, _ = scan(known, plots, at, Plane(), model)
         spent_s = time.perf_counter() - began
-        told = bank.confirmed
-        hypotheses = int(told[bank.family].sum())
-        return Seen(bank.position[:, told], bank.number[told], bank.existence[told], hypotheses, len(bank), spent_s)
+        told = known.confirmed
+        hypotheses = int(told[known.family].sum())
+        return Seen(known.position[:, told], known.number[told], known.existence[told], hypotheses, len(known), spent_s)
 
     return after
 
