@@ -77,7 +77,7 @@ def excess(
     before_aim = np.maximum(distance + runway.aiming_point_x_m - runway.threshold_x_m, 0.0)
     high = np.maximum(before_aim * math.tan(limits.glide_path_rad), limits.least_vertical_m)
     wide = np.maximum(before_aim * math.tan(limits.centreline_rad), limits.least_lateral_m)
-    fast = limits.speed_share * wanted
+    fast = np.maximum(limits.speed_share * wanted, limits.least_fast_mps)
     off = np.stack([above, -above, np.abs(left), speed - wanted], axis=-1)
     ratio = off / np.stack([high, high, wide, np.maximum(fast, 0.1)], axis=-1)
     height = before_aim * math.tan(runway.glide_path_rad) + above

@@ -162,6 +162,7 @@ _TABLES: dict[str, _Table] = {
             "least_vertical_m": ("least_vertical_m", _number(0.0, 1e3)),
             "least_lateral_m": ("least_lateral_m", _number(0.0, 1e3)),
             "speed_share": ("speed_share", _number(0.01, 10.0)),
+            "least_fast_mps": ("least_fast_mps", _number(0.0, 100.0)),
         }
     ),
     "dead_reckoning": _Table(

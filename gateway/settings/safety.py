@@ -37,3 +37,4 @@ class Stabilised:
     least_vertical_m: float = 10.0  # nearer to the runway than where the angles are so much, these hold
     least_lateral_m: float = 20.0
     speed_share: float = 0.15  # faster than the approach speed by this share of it
+    least_fast_mps: float = 3.0  # or by this, where the share is less: gusts
