@@ -266,12 +266,12 @@ def _begun_or_kept(one: Reckoner, since: int, at: int, settings: DeadReckoning) 
         if at - end * CELL_NS > SILENT_NS:  # for so long what is missing may still come
             tips = ()
     if not tips:
-        first = _first(one.told, settings)
+        first = first_tip(one.told, settings)
         tips = () if first is None else (first,)
     return replace(one, tips=tips)
 
 
-def _first(told: Told, settings: DeadReckoning) -> Tip | None:
+def first_tip(told: Told, settings: DeadReckoning) -> Tip | None:
     """The first tip, at the newest position with a velocity that an attitude is near to, if the unit goes on from there."""
     places, attitudes = told.places, told.series[ATTITUDE]
     if not len(places.at) or not len(attitudes.at) or not len(told.inertial.at):

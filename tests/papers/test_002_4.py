@@ -5,12 +5,16 @@ Twenty runs of 40 s with GPS and 20 s without, at 25 Hz; the paper's 199 s are m
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from sim.inertial import aeroplane, car
 from sim.studies import dead_reckoning as study
+from sim.studies import denial, real_flight
 
+DATA = Path(__file__).parents[3] / "shared" / "data"
 SHORT = study.Plan(with_gps_s=40, without_s=20, rate_hz=25)
 LONG = study.Plan(with_gps_s=60, without_s=199, rate_hz=25)
 
@@ -58,3 +62,27 @@ def test_199_seconds() -> None:
     calm = study.error_state(aeroplanes, airspeed=True, wind=False)
     assert 4.0 * np.median(held.error_m[:, -1]) <= np.median(calm.error_m[:, -1])
     assert min(wheels.inside.mean(), held.inside.mean()) >= 0.99
+
+
+@pytest.mark.study
+@pytest.mark.skipif(not DATA.exists(), reason="the recordings are not beside the project")
+@pytest.mark.parametrize("length_s", [20.0, 60.0])
+def test_on_a_real_flight_it_is_ten_times_better_than_constant_velocity(length_s: float) -> None:
+    """Three times are asked for in the median of all windows, and 95 % within three sigma."""
+    found = real_flight.windows(real_flight.flight(DATA / "fixed-wing-thor75.mat"), length_s)
+    assert 10.0 * np.median(found.reckoned_m[:, -1]) <= np.median(found.constant_m[:, -1])
+    assert 10.0 * np.median(found.reckoned_m.mean(axis=1)) <= np.median(found.constant_m.mean(axis=1))
+    assert found.inside.mean() >= 0.95
+
+
+@pytest.mark.study
+def test_false_positions_are_denied_and_good_ones_are_not() -> None:
+    """2 m/s within 20 s, 50 m at once, nothing in ten hours; three sigma hold in 99 % of the seconds without positions."""
+    figures: dict[str, float] = {}
+    denial.table(20, 5, figures)
+    assert figures["denied, a step of 50 m, last"] <= 1.0
+    assert figures["denied, 2 m/s, last"] <= 20.0
+    assert figures["denied, 2 m/s, velocities true, last"] <= 20.0
+    assert figures["good, hours"] >= 10.0
+    assert figures["good, denied"] == 0.0
+    assert figures["live, inside"] >= 99.0
