@@ -169,6 +169,7 @@ class Work(Reckoning):
             back_s = (self.now - now) / SECOND
             text = f"the session's time went back by {back_s:.0f} s: every track starts again, under its number"
             self.events.append(Event(now, "warning", text))
+            self.count("session's time set back")
         was = self.lanes
         self.lanes, ended = fuse.emptied(was, now)
         self.settled += fuse.settled(was, self.lanes)

@@ -262,6 +262,7 @@ def test_a_session_whose_time_goes_back_starts_again_and_says_so(world: Any) -> 
     arrivals = [*world.heard(first), *world.heard(again)]
     ran = world.run(arrivals, until_s=-980.0)
     assert len(ran.said("time went back by")) == 1
+    assert ran.state.counters["session's time set back"] == 1
     fresh, whole = world.run(first, until_s=15.0).rows(aircraft=ONE), ran.rows(aircraft=ONE)
     assert len(whole) >= 2 * len(fresh) - 10  # coasting rows at the ends may differ
     wanted = {row["time"] - back: row["runway_m"] for row in fresh if row["updated_by"] == "gps"}
