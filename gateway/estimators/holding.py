@@ -11,6 +11,7 @@ Arrays are over n tracks and m modes, as in `modes`. Source: 000 2.1.1; R. Singe
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,6 +92,21 @@ def _answers(elapsed_s: Floats, lasts_s: float) -> tuple[Floats, Floats]:
     (n, 3): what one of 1 adds to position and velocity, and what is left of it; and the covariance (n, 3, 3) that the noise
     of one of variance 1 makes of these.
     """
+    if len(elapsed_s) == 1:  # one track worked again after late data sees the same intervals again
+        return _over(float(elapsed_s[0]), lasts_s)
+    return _integrated(elapsed_s, lasts_s)
+
+
+@lru_cache(maxsize=1024)
+def _over(elapsed_s: float, lasts_s: float) -> tuple[Floats, Floats]:
+    """The same over one time, remembered; nobody may write into them."""
+    response, grown = _integrated(np.array([elapsed_s]), lasts_s)
+    response.setflags(write=False)
+    grown.setflags(write=False)
+    return response, grown
+
+
+def _integrated(elapsed_s: Floats, lasts_s: float) -> tuple[Floats, Floats]:
     t = elapsed_s[:, None]
     x = t * (_POINTS / lasts_s)
     lost = np.expm1(-x)

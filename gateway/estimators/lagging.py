@@ -38,13 +38,13 @@ def faded(
 
 def lag(score: Floats, information: Floats, covariance: Floats) -> Floats | None:
     """What lags add to covariances (n, d, d): of rank one a part, 0 where the mean is no larger than noise's; None: all 0."""
-    least = np.maximum(1e-9 * np.trace(information, axis1=2, axis2=3), 1e-30)
+    least = np.maximum(1e-9 * np.diagonal(information, axis1=2, axis2=3).sum(axis=-1), 1e-30)
     lifted = information + least[..., None, None] * _UNIT
     off = np.linalg.inv(lifted) @ score[..., None]
     excess = (score[..., None, :] @ off)[..., 0, 0]
-    share = np.maximum(0.0, 1.0 - USUAL / np.maximum(excess, 1e-9))
-    if not share.any():
+    if not (excess > USUAL).any():
         return None
+    share = np.maximum(0.0, 1.0 - USUAL / np.maximum(excess, 1e-9))
     by_place, by_speed = np.moveaxis(off[..., 0] * np.sqrt(share)[..., None], 1, 0)
     whole = np.zeros((len(score), _PARTS, covariance.shape[2]))
     of_place = covariance[:, :, POSITION] @ np.linalg.inv(covariance[:, POSITION, POSITION])

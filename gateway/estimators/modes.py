@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -97,7 +97,7 @@ class Numbers:
     across: Floats  # (u,) m/s2
     holds: Bools
     shaken: Shaken
-    stays: Floats  # (m, m), 1 where a mode stays what it is
+    stays: Floats  # (m, m), how much likelier than by the shares it is, at first, that a mode stays what it is
     sides: Floats  # (m, 3), 1 where a mode is straight, to the left, to the right
 
     @classmethod
@@ -114,7 +114,7 @@ class Numbers:
             np.sqrt(shaken.level[uneven]),
             np.array([mode.holds for mode in modes]),
             shaken,
-            np.eye(len(modes)),
+            np.eye(len(modes)) - share / share.sum(),
             (np.sign(turn)[:, None] == [0.0, 1.0, -1.0]).astype(np.float64),
         )
 
@@ -159,7 +159,7 @@ class Modes:
         Source: 000 2.1.2, p_ij. Deviation: of the time since the last update, never of a fixed period.
         """
         keep = np.exp(elapsed_s / -self.lasts_s)[:, None, None]
-        return np.asarray(keep * self.numbers.stays + (1.0 - keep) * self.shares)
+        return np.asarray(self.shares + keep * self.numbers.stays)
 
     @property
     def shares(self) -> Floats:
@@ -172,9 +172,10 @@ def begin(state: Estimate, modes: Modes) -> Mixture:
     n, m = len(state.mean), modes.count
     mean, covariance = state.mean, state.covariance
     if modes.acceleration is not None:
+        level = state.mean[:, 3:5]
         mean, covariance = np.zeros((n, WIDE)), np.zeros((n, WIDE, WIDE))
         mean[:, :SIZE], covariance[:, :SIZE, :SIZE] = state.mean, state.covariance
-        covariance[:, SIZE:, SIZE:] = usual(_course(state.mean[:, 3:5]), modes.acceleration)
+        covariance[:, SIZE:, SIZE:] = usual(_course(level, _speed(level)), modes.acceleration)
     return Mixture(
         np.repeat(mean[:, None], m, axis=1),
         np.repeat(covariance[:, None], m, axis=1),
@@ -206,11 +207,15 @@ def predict(mixture: Mixture, elapsed_s: Floats, modes: Modes, transition: Float
     mean = (carry @ mean[..., None])[..., 0]
     covariance = carry @ covariance @ carry.swapaxes(-1, -2) + noise
     covariance = 0.5 * (covariance + covariance.swapaxes(-1, -2))
-    return replace(
-        mixture,
+    return Mixture(
         mean=mean,
         covariance=covariance,
         weight=weight,
+        score=mixture.score,
+        information=mixture.information,
+        whole_score=mixture.whole_score,
+        whole_information=mixture.whole_information,
+        recent=mixture.recent,
         elapsed_s=mixture.elapsed_s + elapsed_s,
         error=carried_on(mixture.error, weight, carry, noise),
         counted=counted(mixture.weight, modes.shares),
@@ -220,11 +225,11 @@ def predict(mixture: Mixture, elapsed_s: Floats, modes: Modes, transition: Float
 def moved(mean: Floats, weight: Floats, elapsed_s: Floats, modes: Modes) -> tuple[Floats, Floats]:
     """Transition and noise (n, m, d, d) over times (n,) of modes that have mixed: means (n, m, d), weights (n, m)."""
     level = (weight[:, None, :] @ mean[:, :, 3:5])[:, 0]
-    speed = np.sqrt(level[:, 0] * level[:, 0] + level[:, 1] * level[:, 1])
+    speed = _speed(level)
     rate = modes.turn_rate(speed)
     numbers, held = modes.numbers, modes.acceleration
     carry, noise = carried(numbers.shaken, elapsed_s, rate, SIZE if held is None else WIDE)
-    course = _course(level)
+    course = _course(level, speed)
     if len(numbers.uneven):
         slow = np.minimum(speed[:, None] * modes.turn_rate_rps / numbers.across, 1.0)
         turn_along(noise, course, numbers.along, slow, numbers.uneven)
@@ -233,10 +238,14 @@ def moved(mean: Floats, weight: Floats, elapsed_s: Floats, modes: Modes) -> tupl
     return carry, noise
 
 
-def _course(level: Floats) -> Floats:
-    """Level velocities (n, 2) as directions of length 1; 0 of what stands."""
-    speed = np.sqrt(level[:, 0] * level[:, 0] + level[:, 1] * level[:, 1])[:, None]
-    return np.where(speed > 0.0, level / np.maximum(speed, 1e-300), 0.0)
+def _speed(level: Floats) -> Floats:
+    """Lengths (n,) of level velocities (n, 2)."""
+    return np.asarray(np.sqrt(level[:, 0] * level[:, 0] + level[:, 1] * level[:, 1]))
+
+
+def _course(level: Floats, speed: Floats) -> Floats:
+    """Level velocities (n, 2) of lengths (n,) as directions of length 1; 0 of what stands."""
+    return np.asarray(level / np.where(speed > 0.0, speed, np.inf)[:, None])
 
 
 def update(
