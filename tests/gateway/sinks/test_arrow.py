@@ -37,7 +37,7 @@ def test_tables_have_the_columns_that_other_programs_read(tmp_path, pictures):
     assert " ".join(tracks.names) == (
         "time received track aircraft radar_track updated_by state latitude_deg longitude_deg height_m altitude_msl_m "
         "velocity_east_mps velocity_north_mps velocity_up_mps covariance straight left right "
-        "pressure_altitude_m callsign life"
+        "pressure_altitude_m callsign life wind_east_mps wind_north_mps"
     )
     assert (tracks.field("time").type, tracks.field("received").type) == (time, time)
     assert tracks.field("track").type == pa.int64()
