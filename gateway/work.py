@@ -23,12 +23,12 @@ PLOT_MARGIN_S = 4.0  # plots are remembered this much longer than reports: a rep
 
 
 class Turn(IntEnum):
-    """What is done once a second, in which sixteenth of it; at tenths parts of a crowd are predicted."""
+    """What is done once a second, in which sixteenth of it; in the middle, or in twentieths, a crowd is predicted."""
 
     FORGETTING = 1
+    JUDGING = 2  # reports and plots in shares, each soon after another turn
     FORGETTING_MORE = 3
     REGISTERING = 5
-    JUDGING = 8
     LOOKING = 9
     PROBING = 11
     LOOKING_AT_RADARS = 12

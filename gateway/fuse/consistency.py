@@ -32,7 +32,7 @@ LASTING = 0.3  # a receiver whose reports scatter by less than this share of wha
 TOGETHER_AT_LEAST, TOGETHER_ENOUGH = 3, 4.0 * ENOUGH  # aircraft, and squares of theirs, which are many soon
 MANY, WAIT_NS = 64, 5 * SECOND  # measurements that are judged at once, or all that came in so long
 SHARE, TRACKS_AT_LEAST = 200, 8  # of more measurements, of so many tracks or more each, each share has its own instant
-AFTER_NS = SECOND // 32  # not when others have their turns
+AFTER_NS, SLOTS, SLOT_NS = SECOND // 32, 14, SECOND // 16  # when shares have theirs: never when others have their turns
 NOTHING_DUE = 1 << 62
 KEPT_PLOTS, KEPT_REPORTS = 6, 3  # of each track and source, to hold the next ones against
 KEPT_NS = 30 * SECOND
@@ -102,7 +102,7 @@ class Consistency:
         if len(self.waiting) < MANY and at // SECOND * SECOND % WAIT_NS:
             return self
         shares = _shares(self.waiting)
-        planned = tuple((at + AFTER_NS + place * SECOND // len(shares), share) for place, share in enumerate(shares))
+        slots = (at + AFTER_NS + place * SLOTS // len(shares) * SLOT_NS for place in range(len(shares)))
         reports, plots = (
             None if rows is None else rows.in_order().latest(count, at - KEPT_NS)
             for rows, count in ((self.reports, KEPT_REPORTS), (self.plots, KEPT_PLOTS))
@@ -110,7 +110,7 @@ class Consistency:
         return replace(
             self,
             waiting=(),
-            planned=(*self.planned, *planned),
+            planned=(*self.planned, *zip(slots, shares, strict=True)),
             reports=reports if reports is not None and len(reports.at) else None,
             plots=plots if plots is not None and len(plots.at) else None,
         )._remembered(at)

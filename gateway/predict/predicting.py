@@ -17,7 +17,10 @@ from gateway.predict.minds import Remembered
 from gateway.predict.told import Said, Tellings
 from gateway.settings import Site
 
-TOGETHER = 100  # tracks that are predicted at once; of more, each part has its own instant within the second
+FEW = (
+    20  # tracks that are predicted at the whole second, when much else is done; of more, each part has its own instant
+)
+TOGETHER = 100  # tracks of a part
 NEVER = 1 << 62
 
 
@@ -39,11 +42,14 @@ class Predicting:
         return self.planned[0][0] if self.planned else NEVER
 
     def planning(self, tracks: Sequence[int], at: int) -> Predicting:
-        """The same with a round of predictions of these tracks, the first at an instant, the others within the second."""
+        """The same with a round of predictions: of few tracks at an instant, of parts of many in the middles of as many parts
+        of the second after it.
+        """
         parts = [tuple(tracks[first : first + TOGETHER]) for first in range(0, len(tracks), TOGETHER)]
-        return replace(
-            self, planned=tuple((at + place * SECOND // len(parts), part) for place, part in enumerate(parts))
-        )
+        if len(tracks) <= FEW:
+            return replace(self, planned=tuple((at, part) for part in parts))
+        middles = (at + (2 * place + 1) * SECOND // (2 * len(parts)) for place in range(len(parts)))
+        return replace(self, planned=tuple(zip(middles, parts, strict=True)))
 
     def begun(self, at: int) -> tuple[Predicting, tuple[int, ...]]:
         """The same without the part that is due at an instant, and its tracks."""

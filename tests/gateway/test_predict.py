@@ -12,6 +12,7 @@ from gateway.observation import AirData, FlightPlan, GpsReport, Heard, Intent, O
 from gateway.picture import Picture
 from gateway.pipeline import initial, step
 from gateway.predict import TOGETHER, Predicting
+from gateway.predict.predicting import FEW
 from gateway.predict.told import Tellings
 from gateway.settings import DEMO_SITE, Options, Site, Waypoint
 
@@ -216,7 +217,8 @@ def test_how_arrivals_fall_into_ticks_changes_no_bit() -> None:
 
 
 def test_many_tracks_are_predicted_part_by_part_within_the_second() -> None:
-    """Of fewer than three times as many as go together three parts, each at its own instant; every track once."""
+    """Of fewer than three times as many as go together three parts, each at its own instant; every track once. Few are
+    predicted at the whole second."""
     many = range(1, 3 * TOGETHER - TOGETHER // 2)
     planned = Predicting().planning(many, T0)
     at, found = [], []
@@ -225,8 +227,9 @@ def test_many_tracks_are_predicted_part_by_part_within_the_second() -> None:
         planned, tracks = planned.begun(planned.due)
         found += tracks
         assert len(tracks) <= TOGETHER
-    assert at == [T0, T0 + SECOND // 3, T0 + 2 * SECOND // 3]
+    assert at == [T0 + SECOND // 6, T0 + SECOND // 2, T0 + 5 * SECOND // 6]
     assert found == list(many)
+    assert Predicting().planning(range(FEW), T0).planned == ((T0, tuple(range(FEW))),)
 
 
 def on_final(climb_mps: float) -> list[Picture]:
