@@ -135,7 +135,7 @@ def _show_muted(scores: Sequence[MutedScore], console: Console) -> None:
         inside = "" if score.inside is None else f"{100.0 * score.inside:.0f} %"
         ends = f"{score.at_end_m:.1f}", f"{score.largest_m:.1f}", inside
         table.add_row(score.aircraft, score.what, f"{score.lasts_s:.0f} s", f"{score.median_m:.1f}", *by_mark, *ends)
-    console.print(table)
+    Console(width=max(console.width, 110), highlight=False).print(table)  # what is cut short cannot be read
 
 
 def _show_smoothed(found: SmoothedSummary, console: Console) -> None:
