@@ -56,8 +56,8 @@ def shipped(model: Splitting = Splitting(DENSITY, GREATEST_SPEED_MPS), bank: Ban
     return after
 
 
-def printed(model: literal.Printed = literal.Printed(DENSITY, GREATEST_SPEED_MPS)) -> Tracker:
-    """The paper's own: `gateway.estimators.track_splitting_literal`. It tells its two greatest."""
+def printed(model: literal.Printed = literal.Printed(DENSITY, GREATEST_SPEED_MPS), told: int | None = 2) -> Tracker:
+    """The paper's own: `gateway.estimators.track_splitting_literal`. It tells its two greatest, as the paper does; None = all."""
     tracks: literal.Tracks | None = None
 
     def after(plots: Plots, at: int) -> Seen:
@@ -68,9 +68,9 @@ def printed(model: literal.Printed = literal.Printed(DENSITY, GREATEST_SPEED_MPS
         else:
             tracks = literal.scan(tracks, plots, at, Plane(), model)
         spent_s = time.perf_counter() - began
-        told = tracks.greatest(2)
         held = len(tracks.score)
-        return Seen(tracks.mean[:2, told], np.arange(len(told)), tracks.likelihood[told], held, held, spent_s)
+        some = np.arange(held) if told is None else tracks.greatest(told)
+        return Seen(tracks.mean[:2, some], np.arange(len(some)), tracks.likelihood[some], held, held, spent_s)
 
     return after
 
