@@ -174,7 +174,8 @@ def test_a_full_disk_raises_and_leaves_whole_batches(tmp_path, pictures, small_d
     for stream in tmp_path.glob("*.arrows"):
         assert stream.stat().st_size <= 24_000
         with pa.memory_map(str(stream)) as source:  # no half batch stands at its end
-            assert pa.ipc.open_stream(source).read_all().num_rows > 0
+            rows = pa.ipc.open_stream(source).read_all().num_rows
+        assert rows > 0 or stream.stem == "conflicts"  # of one aircraft there are none
 
 
 def test_a_session_that_was_killed_lacks_at_most_the_last_second(tmp_path):
