@@ -17,9 +17,7 @@ from gateway.predict.minds import Remembered
 from gateway.predict.told import Said, Tellings
 from gateway.settings import Site
 
-FEW = (
-    20  # tracks that are predicted at the whole second, when much else is done; of more, each part has its own instant
-)
+FEW = 20  # tracks that are predicted at the whole second, when much else is done; parts of more have their own instants
 TOGETHER = 100  # tracks of a part
 NEVER = 1 << 62
 
