@@ -40,11 +40,12 @@ class Series:
         """The same with what came since, each in its place."""
         if not len(more.at):
             return self
-        at, values = np.concatenate([self.at, more.at]), np.concatenate([self.values, more.values])
-        if (at[1:] > at[:-1]).all():
-            return Series(at, values)
-        order = np.lexsort((*values.T[::-1], at))
-        return Series(at[order], values[order])
+        first = int(np.searchsorted(self.at, more.at.min()))  # what is older stays where it is
+        at, values = np.concatenate([self.at[first:], more.at]), np.concatenate([self.values[first:], more.values])
+        if not (at[1:] > at[:-1]).all():
+            order = np.lexsort((*values.T[::-1], at))
+            at, values = at[order], values[order]
+        return Series(np.concatenate([self.at[:first], at]), np.concatenate([self.values[:first], values]))
 
     def since(self, at: int) -> Series:
         """What was so at an instant, or later."""
