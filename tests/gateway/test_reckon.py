@@ -12,12 +12,13 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from gateway.observation import Attitude, Heard, ImuSample, Many
+from gateway.frames import RadarFrame, RunwayFrame, polar_from_xyz
+from gateway.observation import Attitude, GpsReport, Heard, ImuSample, Many, Observation, RadarPlot
 from gateway.picture import Picture
 from gateway.pipeline import State, initial, step
 from gateway.reckon.reckoners import Reckoners
 from gateway.reckon.told import Series, portioned
-from gateway.settings import DeadReckoning, Options, Runway, Site
+from gateway.settings import DeadReckoning, Options, RadarSite, Runway, Site
 from sim.inertial import aeroplane, car
 from sim.told_rides import Falsified, Teller, heard, honest
 
@@ -126,6 +127,44 @@ def test_no_position_after_a_step_of_50_m_reaches_the_track() -> None:
     rows = errors_m(teller, ran("aeroplane", jumps))
     assert max(off for since_s, _, off, _ in rows if since_s > -20.0) < 15.0
     assert refused(ran("aeroplane", jumps)) >= 40
+
+
+def test_a_position_that_freezes_beside_a_radar_is_not_believed() -> None:
+    radar = RadarSite(1, 100.0, 100.0, 3.0, 0.0, range_sigma_m=10.0)
+    site = replace(SITE, radars=(radar,))
+    teller, said = told("aeroplane", honest)
+    heard_together = sorted([*frozen(said), *plots(teller, radar)], key=lambda one: one.now)
+    some = [picture for _, picture in pictures(heard_together, site=site)]
+    assert [word for _, word in denials(some)] == ["denied"]
+    late = [(by, off) for since_s, by, off, _ in errors_m(teller, some) if since_s > 3.0]
+    assert {by for by, _ in late} == {"radar"}
+    assert max(off for _, off in late) < 40.0
+
+
+def frozen(said: Iterable[Heard]) -> Iterator[Heard]:
+    """The same, with positions that stay the first one that is false."""
+    first: GpsReport | None = None
+    for one in said:
+        made = list[Observation]()
+        for each in one.observations:
+            if isinstance(each, GpsReport) and one.now > START + FALSE_FROM_S * SECOND:
+                first = first or each
+                each = replace(first, valid_at=each.valid_at, received_at=each.received_at)
+            made.append(each)
+        yield replace(one, observations=tuple(made))
+
+
+def plots(teller: Teller, radar: RadarSite) -> Iterator[Heard]:
+    """One a second of where the vehicle is."""
+    frame, motion = RunwayFrame(SITE.runway), teller.ride.motion
+    seen = RadarFrame.of(radar, frame)
+    generator = np.random.default_rng(3)
+    for second in range(1, 75):
+        at, place = START + second * SECOND, second * 50
+        there = motion.latitude_rad[place], motion.longitude_rad[place], motion.height_m[place]
+        polar = polar_from_xyz(seen.from_enu(frame.enu_from_geodetic(*there)))
+        polar = polar + generator.standard_normal(3) * [10.0, 1e-3, 1e-3]
+        yield Heard(at + 50_000_000, (RadarPlot(1, 7, at, at + 50_000_000, *polar.tolist()),))
 
 
 def test_what_agrees_again_is_believed_again() -> None:
