@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.fuse import Fused
-from gateway.observation import Attitude, FlightPlan, GpsReport, Intent, Observation, RadarPlot
+from gateway.observation import Attitude, FlightPlan, GpsReport, Intent, Observation, RadarPlot, WeatherArea
 from gateway.picture import Health, Picture
 from gateway.settings import Site
 from gateway.sinks.serving import free_port
@@ -29,7 +29,7 @@ _GATHERED_NS = 100_000_000  # of session time: a message costs the same for one 
 _GATHERED_AT_MOST = 16  # pictures; more in one message would hold the interpreter for long
 _HEALTH_NS = 1_000_000_000  # as often as it is drawn
 _ATTITUDE_NS = 20_000_000  # of one aircraft: a symbol that turns 50 times a second turns smoothly
-_DRAWN = GpsReport | RadarPlot | FlightPlan | Intent
+_DRAWN = GpsReport | RadarPlot | FlightPlan | Intent | WeatherArea
 
 
 class Apart:

@@ -34,6 +34,7 @@ from gateway.sinks.scene.smoothed import SmoothedScene
 from gateway.sinks.scene.sources import SourceScene, raw_positions
 from gateway.sinks.scene.stages import StageScene
 from gateway.sinks.scene.tracks import TrackScene
+from gateway.sinks.scene.weather import WeatherScene
 
 _ENTITY_NS = 1_000_000  # of session time for each that is drawn: so a crowd takes a fifth of a core
 _CURVES_REST = 4  # of a crowd, curves are drawn so many times less often than what moves
@@ -81,7 +82,7 @@ class RerunSink:
         self._scope, self._health, self._plans = ScopeScene(site), HealthScene(), PlanScene(site)
         self._smoothed, self._register, self._radars = SmoothedScene(site), RegisterScene(site), MultiRadarScene(site)
         self._clutter, self._conflicts = ClutterScene(site), ConflictScene(site)
-        self._believed, self._reckoning = BelievedScene(site), ReckoningScene()
+        self._believed, self._reckoning, self._weather = BelievedScene(site), ReckoningScene(), WeatherScene(site)
         self._period_ns, self._rows_limit = round(period_s * 1e9), rows_limit
         self._rest_ns = self._period_ns
         self._waiting: list[Picture] = []
@@ -165,6 +166,7 @@ class RerunSink:
             *self._predict.entries(pictures, flights),
             *self._conflicts.entries(pictures),
             *self._believed.entries(pictures),
+            *self._weather.entries(pictures),
             *self._reckoning.entries(pictures),
             *self._stages.entries(pictures, flights, self._flights.newest),
             *self._register.entries(pictures),

@@ -8,15 +8,17 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 
+from gateway.observation import WeatherArea
 from gateway.picture import Picture
 from gateway.predict import Candidates, Conflicts
 from gateway.predict.gates import GateAlerts
-from gateway.settings import DEMO_SITE, Waypoint
+from gateway.settings import DEMO_SITE, Waypoint, Weather
 from gateway.sinks.arrow import ArrowSink
 from gateway.sinks.parquet import finish
 from gateway.sinks.scene.believed import BelievedScene
 from gateway.sinks.scene.conflicts import PATH, ConflictScene
 from gateway.sinks.scene.entry import Entry, Rows
+from gateway.sinks.scene.weather import WeatherScene
 
 PLACE = np.array([[-9000.0, 100.0, 500.0]])
 
@@ -94,3 +96,17 @@ def test_candidates_and_alerts_are_drawn_while_they_are_believed(pictures) -> No
     for path in ("/predict/7/candidates", "/predict/7/gates"):
         drawn = rows(entries, path)
         assert ["Clear" in what for _, what in drawn] == [False, False, True]
+
+
+def test_weather_that_is_told_is_drawn_until_it_is_gone(pictures) -> None:
+    """A circle or a polygon as it is told, and a row that clears when it is gone."""
+    circle, polygon = (
+        Weather("CB", 0.54, 1.8, 3000.0),
+        Weather("CB", polygon_rad=((0.5, 1.8), (0.51, 1.8), (0.5, 1.81))),
+    )
+    seen = [
+        replace(one, observations=(WeatherArea("CB", one.now, one.now, area),))
+        for one, area in zip(pictures(1.0)[:3], (circle, polygon, None), strict=True)
+    ]
+    drawn = rows(WeatherScene(DEMO_SITE).entries(seen), "/predict/weather/CB")
+    assert ["Clear" in what for _, what in drawn] == [False, False, True]
