@@ -196,7 +196,8 @@ class Reckoners:
             return {}
         kinds = Kinds.of([self.types.get(aircraft) for aircraft, _, _ in running])
         tips = [one.tips[-1] for _, one, _ in running]
-        left = run(tips, [inputs for _, _, inputs in running], kinds, settings)
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):  # what is no number any more is let go of
+            left = run(tips, [inputs for _, _, inputs in running], kinds, settings)
         return {
             aircraft: replace(one, tips=(*one.tips, *passed))
             for (aircraft, one, _), passed in zip(running, left, strict=True)

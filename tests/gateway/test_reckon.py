@@ -296,6 +296,29 @@ def test_a_vehicle_without_an_inertial_unit_is_nothing_to_dead_reckoning() -> No
     assert sum(len(some) for _, some in state.reckoners.waiting) < 40
 
 
+@pytest.mark.parametrize("wild", [1e6, 0.0])  # adapters let no more pass
+def test_a_unit_that_tells_nonsense_stops_nothing(wild: float) -> None:
+    said = list(told("aeroplane", honest)[1][:150])
+    for place in range(100, 150):
+        samples = (
+            Many(
+                ImuSample,
+                {
+                    **one.columns,
+                    "acceleration_mps2": np.full((len(one), 3), wild),
+                    "angular_rate_radps": np.full((len(one), 3), wild),
+                },
+            )
+            if isinstance(one, Many)
+            else one
+            for one in said[place].observations
+        )
+        said[place] = replace(said[place], observations=tuple(samples))
+    *_, (_, picture) = pictures(said)
+    assert np.isfinite(picture.fuse.latitude_rad).all()
+    assert np.isfinite(picture.fuse.covariance).all()
+
+
 def test_a_site_may_let_everything_pass() -> None:
     site = replace(SITE, dead_reckoning=DeadReckoning(refuses=False))
     *_, (state, _) = pictures(told("aeroplane", jumps)[1][:480], site=site)
