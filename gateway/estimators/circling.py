@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.estimators.turns_and_straights import FULL_TURN, Path, angle_to_go
+from gateway.estimators.turns_and_straights import FULL_TURN, Path, angle_to_go, or_zero
 from gateway.geodesy import wrap_rad
 
 Floats = NDArray[np.float64]
@@ -73,7 +73,7 @@ def go_round(
     near = (distance > 0.5 * np.abs(radius)) & (distance <= ON_CIRCLE * np.abs(radius))
     size = np.where(near, distance, np.abs(radius))  # who is on it stays at the distance that he has
     size, side = np.where(round_it, size, 1.0), np.sign(np.where(round_it, radius, 1.0))
-    go = np.nan_to_num(angle_to_go(path.position, path.course, size, side, following[:, leg + 1]))
+    go = or_zero(angle_to_go(path.position, path.course, size, side, following[:, leg + 1]))
     least = np.minimum(np.where(round_it, circles.least[:, leg], 0.0), FOR_GOOD_RAD)
     go = go + FULL_TURN * np.ceil(np.maximum(least - go, 0.0) / FULL_TURN)
     last = (following[:, leg + 1] == following[:, leg]).all(axis=1)
@@ -98,7 +98,7 @@ def _bend(
     aside = -side * np.arctan2(np.sqrt(size * size + 2.0 * size * own), own)
     way = centre - path.position
     along = np.arctan2(way[:, 1], way[:, 0]) - 0.5 * math.pi * side
-    off = np.nan_to_num(wrap_rad(along - path.course))
+    off = or_zero(wrap_rad(along - path.course))
     angle = np.where(arrived, np.where(np.abs(off) > ALONG_RAD, off, 0.0), aside)
     angle = np.where(round_it, angle, 0.0)
     path.extend(ground, np.sign(angle) * turning_rps, np.abs(angle) / turning_rps, leg)

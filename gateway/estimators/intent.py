@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators.modes import Modes
+from gateway.estimators.turns_and_straights import or_zero
 from gateway.geodesy import wrap_rad
 
 Floats = NDArray[np.float64]
@@ -132,7 +133,7 @@ def seen(before: Seen, off: Floats, turning: Ints, elapsed_s: Floats, inference:
     agreement = np.exp(-0.5 * (off / inference.course_sigma) ** 2)
     fresh = turning != before.turning
     kept = np.where(fresh, 0.0, inference.fade**elapsed_s)
-    agreed = np.nan_to_num(before.agreed) * kept[:, None] + agreement
+    agreed = or_zero(before.agreed) * kept[:, None] + agreement
     length = before.length * kept + 1.0
     straight = agreed / length[:, None]
     flown_at = np.where((turning == 0)[:, None], straight, before.flown_at * (inference.fade**elapsed_s)[:, None])
@@ -141,7 +142,7 @@ def seen(before: Seen, off: Floats, turning: Ints, elapsed_s: Floats, inference:
         manoeuvring = agreement - np.where(np.isnan(before.last), agreement, before.last)
     else:
         usual = np.exp(-to_turn(off, turning) / inference.mean_turn)
-        manoeuvring = usual * (1.0 + inference.kept * np.nan_to_num(flown_at))
+        manoeuvring = usual * (1.0 + inference.kept * or_zero(flown_at))
     return after, np.where((turning == 0)[:, None], straight, manoeuvring)
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from gateway.estimators import intent
 from gateway.estimators.circling import Circles, entered, go_round
-from gateway.estimators.turns_and_straights import Path, angle_to_go
+from gateway.estimators.turns_and_straights import Path, angle_to_go, or_zero
 from gateway.geodesy import wrap_rad
 
 Floats = NDArray[np.float64]
@@ -132,7 +132,7 @@ def ahead(
         path.extend(ground, rate, turn / np.maximum(np.abs(rate), STRAIGHT_RPS), leg)
         ground = speed_on(path.course)
         straight_m, cornering = _straight(path, target, following[:, leg : leg + 2], ground, turning_rps, lead_m)
-        path.extend(ground, np.zeros(n), np.where(arrived, 0.0, straight_m) / ground, leg)
+        path.straight(ground, np.where(arrived, 0.0, straight_m) / ground, leg)
         if circles is not None:
             go_round(path, circles, leg, following, arrived, turning_rps, speed_on)
             ground = speed_on(path.course)
@@ -165,7 +165,7 @@ def _first_turn(
     """The angle and rate of the turn that leads to the first point, and whether there is one."""
     turns = np.abs(now.turn_rate) > STRAIGHT_RPS
     known = ~np.isnan(following[:, 0, 0])
-    off = np.nan_to_num(_off(now.position, course, target))
+    off = or_zero(_off(now.position, course, target))
     short = np.where(off < 0.0, -1.0, 1.0)
     goes_on = turns
     if rule == "default":  # who has turned a little too far rolls out, and does not go round once more
@@ -173,7 +173,7 @@ def _first_turn(
         goes_on = turns & ~((beyond < 0.0) & (beyond > -ROLL_OUT_RAD))
     rate = np.where(goes_on, now.turn_rate, short * turning_rps)
     go = angle_to_go(now.position, course, speed / np.abs(rate), np.sign(rate), target)
-    turn = np.where(~turns & (np.abs(off) <= ALIGNED_RAD), 0.0, np.nan_to_num(go))
+    turn = np.where(~turns & (np.abs(off) <= ALIGNED_RAD), 0.0, or_zero(go))
     if rule == "literal":
         return turn, rate, known & np.where(turns, ~np.isnan(go), np.abs(off) <= intent.ALIGNED_RAD)
     there_is_more = (following[:, 0] != following[:, -1]).any(axis=1)  # inside the circle: it is all but there
@@ -182,7 +182,7 @@ def _first_turn(
 
 def _next_turn(path: Path, point: Floats, ground: Floats, turning_rps: Floats) -> tuple[Floats, Floats]:
     """The angle and rate of the turn from a path's end to a next point, the short way."""
-    off = np.nan_to_num(_off(path.position, path.course, point))
+    off = or_zero(_off(path.position, path.course, point))
     side = np.where(off < 0.0, -1.0, 1.0)
     go = angle_to_go(path.position, path.course, ground / turning_rps, side, point)
     small = np.abs(off) <= ALIGNED_RAD
@@ -197,7 +197,7 @@ def _straight(
     Who begins to turn late for the corner turns faster.
     """
     way = target - path.position
-    distance = np.nan_to_num(way[:, 0] * np.cos(path.course) + way[:, 1] * np.sin(path.course))
+    distance = or_zero(way[:, 0] * np.cos(path.course) + way[:, 1] * np.sin(path.course))
     further = following[:, 1] - following[:, 0]
     turn = wrap_rad(np.arctan2(further[:, 1], further[:, 0]) - path.course)
     entering = (target != following[:, 0]).any(axis=1)  # a circle: it is not cut short

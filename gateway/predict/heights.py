@@ -42,12 +42,16 @@ def heights(
     up = np.where(known[:, None], reached, free)
     before = np.concatenate([up_now[:, None], planned_up[:, :-1]], axis=1)
     places = np.concatenate([now.position[:, None], route[:, :-1]], axis=1)
-    for leg in range(planned_up.shape[1]):
+    for leg in np.flatnonzero(lands.any(axis=0)).tolist():  # of a crowd in the air, none
         here = lands[:, leg] & ahead.follows & ~np.isnan(planned_up[:, leg]) & ~np.isnan(before[:, leg])
-        whole = np.sqrt(((route[:, leg] - places[:, leg]) ** 2).sum(axis=1))
-        left = np.sqrt(((route[:, leg, None] - ahead.position) ** 2).sum(axis=2))
+        whole, left = _length(route[:, leg] - places[:, leg]), _length(route[:, leg, None] - ahead.position)
         share = np.clip(left / np.maximum(whole, 1.0)[:, None], 0.0, 1.0)
         down = planned_up[:, leg, None] + share * (before[:, leg] - planned_up[:, leg])[:, None]
         on = here[:, None] & (ahead.passed >= leg)
         up = np.where(on, np.where(ahead.passed > leg, planned_up[:, leg, None], down), up)
     return np.asarray(up)
+
+
+def _length(way: Floats) -> Floats:
+    """Of ways (..., 2)."""
+    return np.asarray(np.sqrt(way[..., 0] * way[..., 0] + way[..., 1] * way[..., 1]))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gateway.align import SECOND
 from gateway.estimators import intent
 from gateway.estimators.intent import Belief, Inference
+from gateway.estimators.turns_and_straights import or_zero
 from gateway.geodesy import wrap_rad
 from gateway.predict.minds import UNKNOWN, Minds
 
@@ -84,8 +85,8 @@ def motions(
     measured = np.where(fresh, 0.0, wrap_rad(course - older) / np.where(fresh, 1.0, span_s))
     measured = np.where(speed < LEAST_SPEED_MPS, 0.0, measured)
     sigma = math.sqrt(2.0) * velocity_sigma / np.maximum(speed, LEAST_SPEED_MPS) / np.where(fresh, 1.0, span_s)
-    by_modes = np.where(np.isnan(sides[:, 0]), 0, np.array([0, 1, -1])[np.nan_to_num(sides).argmax(axis=1)])
-    by_modes = np.where(np.nan_to_num(sides).max(axis=1) > intent.TURN_SURE, by_modes, 0)
+    by_modes = np.where(np.isnan(sides[:, 0]), 0, np.array([0, 1, -1])[or_zero(sides).argmax(axis=1)])
+    by_modes = np.where(or_zero(sides).max(axis=1) > intent.TURN_SURE, by_modes, 0)
     by_course = np.where(np.abs(measured) > np.maximum(SURE_SIGMAS * sigma, LEAST_RATE_RPS), np.sign(measured), 0.0)
     side = np.where(np.isnan(sides[:, 0]), by_course, by_modes).astype(np.int64)
     usual_sigma = 0.5 * usual_rate
@@ -96,7 +97,7 @@ def motions(
     gained = gained / np.where(fresh, 1.0, elapsed_s)
     period_s = np.where(fresh, 1.0, elapsed_s)
     wander = _wander(before, speed, fresh, period_s)
-    steady = np.where(np.isnan(wander), math.inf, WANDERS_LESS * np.sqrt(np.nan_to_num(wander)))
+    steady = np.where(np.isnan(wander), math.inf, WANDERS_LESS * np.sqrt(or_zero(wander)))
     course_sigma = velocity_sigma / np.maximum(speed, LEAST_SPEED_MPS)
     slow = np.minimum(speed, before.speed) < LEAST_SPEED_MPS
     turned = np.where(fresh | slow, 0.0, np.abs(wrap_rad(course - before.courses[:, 0])))
@@ -158,7 +159,7 @@ def _wander(before: Minds, speed: Floats, fresh: Bools, period_s: Floats) -> Flo
     """The mean square (n,) of what the speed changes by in a second, faded; NaN = not known yet."""
     change = (speed - before.speed) ** 2 / period_s
     keep = np.exp(-period_s / WANDER_MEMORY_S)
-    after = np.where(np.isnan(before.wander), change, keep * np.nan_to_num(before.wander) + (1.0 - keep) * change)
+    after = np.where(np.isnan(before.wander), change, keep * or_zero(before.wander) + (1.0 - keep) * change)
     return np.where(fresh, before.wander, after)
 
 
@@ -192,16 +193,14 @@ def trusted(before: Minds, at: int, now: Motions, goal: Floats, circles: Bools, 
     start = np.where(before.declared_at == UNKNOWN, TRUSTED_AT_FIRST, np.maximum(before.trust, TRUSTED_AGAIN))
     trust = np.where(another, start, before.trust)
     elapsed_s = np.where(before.at == UNKNOWN, 1.0, np.clip((at - before.at) / SECOND, 0.0, STALE_S))
-    toward = (now.side != 0) & (intent.to_turn(np.nan_to_num(off)[:, None], now.side)[:, 0] < math.pi)
+    toward = (now.side != 0) & (intent.to_turn(or_zero(off)[:, None], now.side)[:, 0] < math.pi)
     away = (now.side != 0) & ~toward
-    fits = np.exp(-0.5 * (np.nan_to_num(off) / TOLERATED_RAD) ** 2)
+    fits = np.exp(-0.5 * (or_zero(off) / TOLERATED_RAD) ** 2)
     likelihood = np.where(toward, np.maximum(fits, 0.5), np.where(away, 0.05, np.maximum(fits, 0.02)))
     likelihood = np.where(
         circles & (distance < 2.0 * NEAR_RADII * radius), np.where(now.side != 0, 0.5, WANDERS), likelihood
     )
-    past = (np.abs(np.nan_to_num(off)) > 0.5 * math.pi) & (
-        distance > REACTS_S * now.speed
-    )  # and nobody said what is next
+    past = (np.abs(or_zero(off)) > 0.5 * math.pi) & (distance > REACTS_S * now.speed)  # and nobody said what is next
     near = (distance < NEAR_RADII * radius) & ~past
     silent = ~circles & (near | ((at - since) / SECOND < REACTS_S)) | (now.speed < LEAST_SPEED_MPS)
     weight = np.where(silent, 1.0, (likelihood / WANDERS) ** elapsed_s)
