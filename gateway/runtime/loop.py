@@ -1,4 +1,4 @@
-"""The loops that drive a session: live, in ticks of 10 to 20 ms; replayed, at full speed or at the pace of old."""
+"""The loops that drive a session: live, in ticks of 10 to 50 ms; replayed, at full speed or at the pace of old."""
 
 from __future__ import annotations
 
