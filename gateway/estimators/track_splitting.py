@@ -29,7 +29,7 @@ from gateway.estimators.track_splitting_bank import (
 from gateway.estimators.track_splitting_gates import near
 from gateway.estimators.track_splitting_plots import Sight, along, corrected, spread
 from gateway.estimators.track_splitting_shares import shared
-from gateway.observation import made_swiftly
+from gateway.frozen import made_swiftly
 
 __all__ = ["Bank", "Plots", "Scan", "Splitting", "scan"]
 

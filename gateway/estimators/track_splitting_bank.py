@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators.track_splitting_plots import moved
-from gateway.observation import made_swiftly
+from gateway.frozen import made_swiftly
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

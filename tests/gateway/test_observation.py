@@ -8,7 +8,8 @@ from typing import get_args
 
 import pytest
 
-from gateway.observation import Heard, Many, Observation, made_swiftly
+from gateway.frozen import made_swiftly
+from gateway.observation import Heard, Many, Observation
 
 KINDS = (*(one for one in get_args(Observation) if one is not Many), Heard)
 
