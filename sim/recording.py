@@ -15,7 +15,7 @@ from gateway.runtime.folder import Record, make_folder, session_name
 from gateway.runtime.recorder import Recorder
 from gateway.runtime.wholefile import WholeFile
 from gateway.settings import Options, format_site
-from gateway.sinks.arrow import TRUTH, truth_batch
+from gateway.sinks.batches import TRUTH, truth_batch
 from sim.events import events, truth
 from sim.scene import Scene
 

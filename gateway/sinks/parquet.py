@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from gateway.fuse import Fused
-from gateway.sinks.arrow import SCHEMAS, TRACKS, tracks_batch
+from gateway.sinks.batches import SCHEMAS, TRACKS, tracks_batch
 
 SMOOTHED_PART = "smoothed.parquet.part"  # while it is written, at the end of a session
 ROW_GROUP = 16384  # rows gathered before Parquet is handed a row group: bounds memory, keeps compression good

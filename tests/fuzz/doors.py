@@ -35,7 +35,7 @@ from gateway.runtime.setup import Place, RunFailure, Setup
 from gateway.runtime.stamps import Stamper
 from gateway.runtime.survey import survey
 from gateway.settings import format_site
-from gateway.sinks.arrow import predictions_batch, tracks_batch, truth_batch
+from gateway.sinks.batches import predictions_batch, tracks_batch, truth_batch
 
 MAVLINK, RADAR, STREAM = 0, 2, 1  # link numbers
 

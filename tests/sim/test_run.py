@@ -13,7 +13,7 @@ from adapters.mavlink_frames import parse
 from gateway.runtime.folder import read_record
 from gateway.runtime.urls import Url
 from gateway.settings import parse_site
-from gateway.sinks.arrow import TRUTH
+from gateway.sinks.batches import TRUTH
 from sim.events import events
 from sim.recording import write_datagrams, write_session
 from sim.run import play

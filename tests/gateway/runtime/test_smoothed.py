@@ -14,7 +14,7 @@ from gateway.observation import Truth
 from gateway.runtime.smoothed import Smoothing
 from gateway.runtime.spool import Spool
 from gateway.settings import Options
-from gateway.sinks.arrow import TRACKS
+from gateway.sinks.batches import TRACKS
 from gateway.sinks.parquet import SmoothedTable
 
 
