@@ -88,7 +88,7 @@ def declare(
 
 def _lines(aircraft: str | None, to: str | None, withdraw: bool, file: Path | None) -> list[bytes]:
     from adapters.declared import Goal, encode_intent
-    from gateway.runtime.declaring import goal_of
+    from gateway.runtime.declarable import goal_of
 
     if file is not None:
         if aircraft is not None or to is not None or withdraw:
@@ -105,7 +105,7 @@ def _lines(aircraft: str | None, to: str | None, withdraw: bool, file: Path | No
 
 
 def _in_file(file: Path) -> list[bytes]:
-    from gateway.runtime.declaring import lines_of
+    from gateway.runtime.declarable import lines_of
     from gateway.settings import SiteError
     from gateway.settings.declared import parse_declared
 

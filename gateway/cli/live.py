@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import contextlib
 import sys
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
+from gateway.cli.live_options import Declares, Links, PlanOption, SecondsOption, Sending, Trust
 from gateway.cli.replay import read_plans
 from gateway.cli.spread import spread
 
 if TYPE_CHECKING:
-    from gateway.runtime.allowed import Allowed
+    from gateway.cli.display import Display
     from gateway.runtime.declaring import Declaring
     from gateway.runtime.links import Link
-    from gateway.runtime.manners import Manners
     from gateway.runtime.setup import Setup
 
 _HELP = """
@@ -41,194 +40,6 @@ Examples:
 
   talkdown live --mavlink serial:/dev/ttyUSB0:57600 --key link.key --publish udpout:127.0.0.1:14551
 """
-
-_LINKS, _SENDING, _TRUST = "Links", "What is sent", "Who is believed"
-
-SecondsOption = Annotated[
-    float | None, typer.Option("--seconds", metavar="S", min=0.0, help="End after so many seconds.", show_default=False)
-]
-PlanOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--plan",
-        metavar="[VEHICLE=]FILE",
-        help="A mission file (.plan, QGC WPL 110), and whose it is, such as mavlink:2=circuit.plan; repeatable.",
-        show_default=False,
-    ),
-]
-
-
-@dataclass(frozen=True, slots=True)
-class Declares:
-    """How people may declare where aircraft go, and weather."""
-
-    declared: Annotated[
-        Path | None,
-        typer.Option(
-            "--declared",
-            metavar="FILE",
-            help="A TOML file that is watched: [[declared]] where aircraft go, [[weather]] to avoid.",
-            show_default=False,
-        ),
-    ] = None
-    declare_port: Annotated[
-        int | None,
-        typer.Option(
-            "--declare-port",
-            metavar="N",
-            min=0,
-            max=65535,
-            help="Where `talkdown declare` is listened to, on this machine only; 0 takes a free port. (default: 30071)",
-            show_default=False,
-        ),
-    ] = None
-
-    def opened(self) -> Declaring:
-        """Both, open. Raises LinkError, UsageError."""
-        from gateway.runtime.declaring import Declaring, DeclaringPort, WatchedFile
-        from gateway.settings import SiteError
-
-        try:
-            file = None if self.declared is None else WatchedFile(self.declared)
-        except SiteError as error:
-            raise UsageError(str(error)) from error
-        return Declaring(DeclaringPort(self.declare_port), file)
-
-
-@dataclass(frozen=True, slots=True)
-class Links:
-    """What is listened to."""
-
-    mavlink: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--mavlink",
-            metavar="URL",
-            help="A MAVLink link; may be given several times. Port 14550 if none is said.",
-            show_default=False,
-            rich_help_panel=_LINKS,
-        ),
-    ] = None
-    radar: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--radar",
-            metavar="URL",
-            help="A landing-radar link; may be given several times. Port 30070 if none is said.",
-            show_default=False,
-            rich_help_panel=_LINKS,
-        ),
-    ] = None
-
-    @contextlib.contextmanager
-    def opened(self) -> Iterator[tuple[list[Link], list[Link]]]:
-        """The links of both kinds, open while the context lasts. Raises UsageError, LinkError."""
-        from gateway.runtime.links import open_link
-        from gateway.runtime.urls import MAVLINK_PORT, RADAR_PORT
-
-        with contextlib.ExitStack() as opened:
-
-            def links(texts: list[str] | None, port: int) -> list[Link]:
-                urls = take.read_urls(texts or [], port)
-                return [opened.enter_context(contextlib.closing(open_link(url))) for url in urls]
-
-            yield links(self.mavlink, MAVLINK_PORT), links(self.radar, RADAR_PORT)
-
-
-@dataclass(frozen=True, slots=True)
-class Trust:
-    """Who is believed."""
-
-    allow_peer: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--allow-peer",
-            metavar="ADDRESS",
-            help="Hear only these senders: 10.0.0.5 or 192.168.1.0/24; repeatable.",
-            show_default=False,
-            rich_help_panel=_TRUST,
-        ),
-    ] = None
-    allow_system: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--allow-system",
-            metavar="N",
-            help="Hear only these MAVLink system numbers: 1,2,10-20; repeatable.",
-            show_default=False,
-            rich_help_panel=_TRUST,
-        ),
-    ] = None
-
-    def allowed(self) -> Allowed:
-        """Who is heard. Raises AllowError."""
-        from gateway.runtime.allowed import parse_allowed
-
-        return parse_allowed(self.allow_peer or (), self.allow_system or ())
-
-
-@dataclass(frozen=True, slots=True)
-class Sending:
-    """What is sent, all of it only if asked for."""
-
-    heartbeat: Annotated[
-        bool,
-        typer.Option(
-            "--heartbeat", help="Send a heartbeat a second, as a ground station does.", rich_help_panel=_SENDING
-        ),
-    ] = False
-    request_rates: Annotated[
-        bool,
-        typer.Option(
-            "--request-rates",
-            help="Ask vehicles for the messages that do not come often enough.",
-            rich_help_panel=_SENDING,
-        ),
-    ] = False
-    fetch_mission: Annotated[
-        bool, typer.Option("--fetch-mission", help="Read each vehicle's mission, once.", rich_help_panel=_SENDING)
-    ] = False
-    publish: Annotated[
-        str | None,
-        typer.Option(
-            "--publish",
-            metavar="URL",
-            help="Tell the tracks as ADSB_VEHICLE to a ground station or vehicle, such as udpout:127.0.0.1:14551.",
-            show_default=False,
-            rich_help_panel=_SENDING,
-        ),
-    ] = None
-    publish_system: Annotated[
-        int,
-        typer.Option(
-            "--publish-system",
-            metavar="N",
-            min=1,
-            max=255,
-            help="As which system's ADS-B receiver; stations show traffic of vehicles that they know.",
-            rich_help_panel=_SENDING,
-        ),
-    ] = 1
-    publish_without: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--publish-without",
-            metavar="AIRCRAFT",
-            help="Do not tell of this one, such as mavlink:1: a vehicle that avoids traffic must not be told of itself.",
-            show_default=False,
-            rich_help_panel=_SENDING,
-        ),
-    ] = None
-
-    def manners(self, key: bytes | None) -> Manners | None:
-        """How to speak on MAVLink links, signed with a key if there is one; None = not at all."""
-        from gateway.runtime.manners import Manners
-
-        if not (self.heartbeat or self.request_rates or self.fetch_mission):
-            return None
-        return Manners(
-            heartbeat=self.heartbeat, request_rates=self.request_rates, fetch_mission=self.fetch_mission, key=key
-        )
 
 
 def register(app: typer.Typer) -> None:
@@ -281,11 +92,8 @@ def live(
             Viewing(looks) as viewing,
             Display(viewing, quiet=telling.quiet, as_json=telling.json) as display,
         ):
-            for link in (*opened[0], *opened[1]):
-                display.say(f"Listening on {link.url}.{buffer_of(link)}")
             declaring = declares.opened()
-            if declaring.port is not None:
-                display.say(f"Declarations on port {declaring.port.port} of this machine.")
+            _say_where(display, (*opened[0], *opened[1]), declaring)
             summary = run_live(
                 *opened,
                 setup,
@@ -302,6 +110,14 @@ def live(
         raise UsageError(str(error)) from error
     except RunFailure as failure:
         raise RunError(str(failure)) from failure
+
+
+def _say_where(display: Display, links: Sequence[Link], declaring: Declaring) -> None:
+    """What is listened on."""
+    for link in links:
+        display.say(f"Listening on {link.url}.{buffer_of(link)}")
+    if declaring.port is not None:
+        display.say(f"Declarations on port {declaring.port.port} of this machine.")
 
 
 def _setup(

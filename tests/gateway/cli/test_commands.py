@@ -9,7 +9,8 @@ import pytest
 from gateway import __version__
 from gateway.cli.app import check_packages, run
 from gateway.cli.failures import Failure
-from gateway.cli.live import Links, live
+from gateway.cli.live import live
+from gateway.cli.live_options import Links
 from gateway.cli.options import Viewer
 from gateway.cli.replay import read_speed
 from gateway.cli.viewing import chosen

@@ -13,8 +13,10 @@ import pytest
 from adapters.declared import Goal, decode, encode_intent
 from gateway.cli.app import run
 from gateway.observation import Intent, WeatherArea
-from gateway.runtime import declaring
-from gateway.runtime.declaring import DeclaringPort, WatchedFile, declare, goal_of
+from gateway.runtime import declared_file
+from gateway.runtime.declarable import goal_of
+from gateway.runtime.declared_file import WatchedFile
+from gateway.runtime.declaring import DeclaringPort, declare
 from gateway.runtime.urls import LinkError
 from gateway.settings import SiteError
 
@@ -157,7 +159,7 @@ radius_m = 2000.0
 
 def test_a_file_is_watched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What it declares is told once; what changes is told, what goes is withdrawn; an unknown point is said once."""
-    monkeypatch.setattr(declaring, "_LOOK_EVERY_S", 0.0)
+    monkeypatch.setattr(declared_file, "_LOOK_EVERY_S", 0.0)
     path = tmp_path / "told.toml"
     path.write_text(FILE)
     file = WatchedFile(path)
