@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND
 from gateway.estimators import two_segment
-from gateway.estimators.modes import level_turn_rate
+from gateway.estimators.mode_set import level_turn_rate
 from gateway.frames import RunwayFrame
 from gateway.fuse import Lane
 from gateway.fuse.weighting import Model
