@@ -225,7 +225,10 @@ def run(hours: int, say: Callable[[str], None]) -> list[Held]:
         gc.collect()
         assert session._state is not None
         names = set(session._state.__dataclass_fields__) - APART
-        state, decoder = deep_size(*(getattr(session._state, name) for name in names)), deep_size(session._decoder)
+        state, decoder = (
+            deep_size(*(getattr(session._state, name) for name in names)),
+            deep_size(session._hearing.decoder),
+        )
         others = deep_size(session, drawn, published) - state - decoder
         return Held(hour, state, decoder, others, resident_mb(), session._state.lanes.next_track - 1)
 

@@ -1,9 +1,13 @@
-"""What was said before a session's beginning (replay --from) and still holds then: plans, what people declared, states, where radars stand."""
+"""What was said before a session's beginning (replay --from) and still holds then.
+
+That is plans, what people declared, states, and where radars stand.
+"""
 
 from __future__ import annotations
 
 from collections import deque
 
+from adapters.declared import DECLARED
 from gateway.observation import FlightPlan, Heard, Intent, Observation, RadarStatus, VehicleStatus, WeatherArea
 
 _NOTES_AT_MOST = 32
@@ -20,9 +24,9 @@ class Opening:
     def keep(self, heard: Heard) -> None:
         """Take in what came before the beginning."""
         for observation in heard.observations:
-            if isinstance(observation, FlightPlan | VehicleStatus):
-                self._holding[type(observation), observation.aircraft] = observation
-            elif isinstance(observation, Intent) and observation.told_by == "declared":
+            if isinstance(observation, FlightPlan | VehicleStatus) or (
+                isinstance(observation, Intent) and observation.told_by == DECLARED
+            ):
                 self._holding[type(observation), observation.aircraft] = observation
             elif isinstance(observation, WeatherArea):
                 self._holding[type(observation), observation.name] = observation

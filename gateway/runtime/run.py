@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,15 +15,13 @@ import numpy as np
 
 from adapters import Arrival, Source
 from adapters.arrivals import Arrivals
-from adapters.decode import Decoder
-from adapters.signing import SigningGuard
 from gateway import __version__
 from gateway.observation import Heard
 from gateway.picture import Picture
 from gateway.pipeline import State, initial, step
 from gateway.predict.told import known_points
 from gateway.runtime.folder import Record, make_folder, remembered_for, session_name
-from gateway.runtime.mutes import Muting
+from gateway.runtime.hearing import Hearing
 from gateway.runtime.opening import Opening
 from gateway.runtime.outputs import Outputs
 from gateway.runtime.places import PlaceFinder
@@ -48,10 +45,6 @@ class Run:
         self._wall_began = self._flushed = time.monotonic_ns()
         self._watermark = started_at
         self._first_at: int | None = None
-        self._sources: dict[int, Source] = {}
-        self._arrivals: Counter[int] = Counter()  # by source
-        signing = None if setup.signing_key is None else SigningGuard(setup.signing_key, setup.live)
-        self._decoder = Decoder([], keys=setup.keys, live=setup.live, signing=signing)
         self._state: State | None = None
         self._tally: Tally | None = None
         self._held: list[Heard] = []
@@ -59,7 +52,6 @@ class Run:
         self._untold: tuple[tuple[str, str], ...] = ()  # notes for the next step
         begins_at = setup.options.begins_at
         self._opening = None if begins_at is None else Opening(begins_at)
-        self._muting = Muting(setup.options.mutes)
         # What waits for the disk must not hold up what comes in; a replay has nothing that could wait for it.
         self._aside = Aside("archive") if setup.live and setup.archive is not None else AtOnce()
         self._recorder: Recorder | None = None
@@ -68,6 +60,7 @@ class Run:
             name = setup.name or (setup.place.site.name if setup.place else "")
             self.folder = make_folder(setup.archive, session_name(started_at, name))
             self._recorder = self._record_into(self.folder)
+        self._hearing = Hearing(setup, self._recorder)
         if setup.place is not None:
             self._settle(setup.place)
 
@@ -113,13 +106,10 @@ class Run:
 
     def add(self, source: Source) -> None:
         """A source that is new."""
-        self._sources[source.number] = source
-        self._decoder.add(source)
-        if self._recorder is not None:
-            try:
-                self._recorder.add(source)
-            except OSError as error:
-                raise self._failure(error) from error
+        try:
+            self._hearing.add(source)
+        except OSError as error:
+            raise self._failure(error) from error
 
     def work(
         self,
@@ -133,7 +123,7 @@ class Run:
         """
         heard = self._hear(Arrivals.of(arrivals))
         self._watermark = max(self._watermark, watermark)
-        mark = self._decoder.watermark(self._watermark)
+        mark = self._hearing.decoder.watermark(self._watermark)
         heard.append(mark if not notes else replace(mark, notes=(*mark.notes, *notes)))
         if self._opening is not None:
             heard = self._before(heard, self._opening)
@@ -160,28 +150,7 @@ class Run:
         return self._decode(arrivals)
 
     def _decode(self, arrivals: Arrivals) -> list[Heard]:
-        numbers = np.bincount(arrivals.source)
-        for source in np.flatnonzero(numbers).tolist():
-            self._arrivals[source] += int(numbers[source])
-        if self.outputs is not None and self.outputs.publishes_on:
-            arrivals = self._without_our_own(arrivals, self.outputs)
-        said, refused = self._decoder.hear_many(arrivals)
-        if self._recorder is not None:
-            self._recorder.keep_all(arrivals, refused)
-        if not self.setup.options.mutes:
-            return [heard for _, heard in said]
-        left = (self._muting.without_muted(heard, arrivals[place].received_at) for place, heard in said)
-        return [heard for heard in left if heard is not None]
-
-    def _without_our_own(self, arrivals: Arrivals, outputs: Outputs) -> Arrivals:
-        """What came in, but for what we published ourselves and somebody passed on."""
-        others = []
-        for arrival in arrivals:
-            if not outputs.is_our_own(arrival.data):
-                others.append(arrival)
-            elif self._recorder is not None:
-                self._recorder.refuse(arrival)
-        return arrivals if len(others) == len(arrivals) else Arrivals.of(others)
+        return self._hearing.hear(arrivals, self.outputs)
 
     def _before(self, heard: list[Heard], opening: Opening) -> list[Heard]:
         """Nothing has come yet from the session's beginning on: keep what will hold then, unless time has come to it."""
@@ -200,7 +169,7 @@ class Run:
         if self._state is None:
             self._look(before)
         self._opening = None
-        return [opening.deliver(self._decoder.session_time(opening.begins_at))]
+        return [opening.deliver(self._hearing.decoder.session_time(opening.begins_at))]
 
     def _look(self, heard: list[Heard]) -> None:
         """See whether what was heard tells where we are."""
@@ -213,10 +182,10 @@ class Run:
         assert self._state is not None
         assert self._tally is not None
         assert self.outputs is not None
-        health = self._decoder.health(self._watermark)
+        health = self._hearing.decoder.health(self._watermark)
         self._state, picture = step(self._state, heard, health)
         if self.setup.options.mutes:
-            picture = self._muting.muted.add(picture)
+            picture = self._hearing.muting.muted.add(picture)
         self._tally.add(picture)
         try:
             if self._recorder is not None:
@@ -238,7 +207,7 @@ class Run:
             return
         try:
             registered = None if self._state is None else self._state.to_remember(self._watermark)
-            self._recorder.describe(epoch_offset_s=self._decoder.epoch_offset_s, registered=registered)
+            self._recorder.describe(epoch_offset_s=self._hearing.decoder.epoch_offset_s, registered=registered)
             self._recorder.flush(self._watermark, self._counters())
         except OSError as error:
             raise self._failure(error) from error
@@ -250,7 +219,7 @@ class Run:
     def _counters(self) -> dict[str, int]:
         gateway = self._tally.gateway_counters() if self._tally else {}
         outputs = self.outputs.counters() if self.outputs else {}
-        return {**self._link_counters, **self._decoder.counters(), **self._muting.counters, **gateway, **outputs}
+        return {**self._link_counters, **self._hearing.counters(), **gateway, **outputs}
 
     def _failure(self, error: OSError) -> RunFailure:
         where = self.folder or error.filename or "the archive"
@@ -292,19 +261,14 @@ class Run:
     def _summary(self, ended: str) -> Summary:
         tally = self._tally
         began = max(self.started_at if self._first_at is None else self._first_at, self.setup.options.begins_at or 0)
-        rows = tuple(
-            {"number": source.number, "kind": source.kind, "name": source.name, "origin": source.origin}
-            | {"arrivals": self._arrivals[source.number]}
-            for source in self._sources.values()
-        )
         return Summary(
             ended=ended,
             duration_s=max(self._watermark - began, 0) / 1e9,
             wall_s=(time.monotonic_ns() - self._wall_began) / 1e9,
             site=self.place.site.name if self.place else "",
             site_origin=self.place.origin if self.place else "",
-            epoch_offset_s=self._decoder.epoch_offset_s or 0,
-            sources=rows,
+            epoch_offset_s=self._hearing.decoder.epoch_offset_s or 0,
+            sources=self._hearing.sources(),
             observations=tally.named_observations() if tally else {},
             tracks=tally.tracks if tally else 0,
             aircraft=tuple(sorted(tally.aircraft)) if tally else (),
@@ -314,7 +278,7 @@ class Run:
             associations_lost=tally.changes["lost"] if tally else 0,
             counters=self._counters(),
             accuracy=tally.accuracy.scores() if tally else {},
-            muted=self._muting.muted.scores(),
+            muted=self._hearing.muting.muted.scores(),
             smoothed=self.outputs.smoothed() if self.outputs else None,
             archive=self.folder,
         )
