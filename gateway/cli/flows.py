@@ -58,7 +58,7 @@ def flows(
     ] = None,
     least: Annotated[
         int, typer.Option("--least", metavar="N", min=2, help="How many flights make a flow; fewer came alone.")
-    ] = 5,
+    ] = 3,
     archive: take.ArchiveOption = None,
     quiet: take.QuietOption = False,
     json: take.JsonOption = False,
@@ -132,7 +132,11 @@ def _document(tracks: tuple[Track, ...], result: Flows, where: tuple[float, floa
             }
             for flow in result.flows
         ],
-        "alone": [track.name for track, label in zip(tracks, result.labels, strict=True) if label < 0],
+        "alone": [
+            {"flight": track.name, "aside_m": None if math.isnan(aside) else aside}
+            for track, label, aside in zip(tracks, result.labels, result.aside_m.tolist(), strict=True)
+            if label < 0
+        ],
     }
 
 
@@ -157,7 +161,11 @@ def _show(tracks: tuple[Track, ...], result: Flows, where: tuple[float, float], 
             *(f"{one:.0f}" for one in spreads),
         )
     console.print(table)
-    alone = [track.name for track, label in zip(tracks, result.labels, strict=True) if label < 0]
+    alone = [
+        track.name if math.isnan(aside) else f"{track.name} ({aside / 1000.0:.1f} km aside)"
+        for track, label, aside in zip(tracks, result.labels, result.aside_m.tolist(), strict=True)
+        if label < 0
+    ]
     if alone:
         console.print(f"alone: {', '.join(alone)}")
     more = f"; {left_out} more did not end low" if left_out else ""

@@ -1,11 +1,12 @@
 """Arrival flows: which ways many arrivals took, how long they took, and who took none of them. Source: 002-7.
 
 A track is east, north and height in metres about the airport over seconds to landing (negative). `literal` is as printed,
-`jaccard` its repair, `default` compares whole tracks at equal distances to go.
+`jaccard` its repair, `default` compares whole tracks at equal distances to go and names who is typical of no flow.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -31,7 +32,14 @@ CENTRES, SHARED = 30, 8
 COMMON = (
     0.6  # of the centres that either of two tracks visits: half of a short arrival is the final that all of them share
 )
-LEAST_FLIGHTS = 5  # fewer are no flow
+LEAST_FLIGHTS = 3  # fewer are no flow: two may come the same way by chance, and which of two is typical cannot be said
+SEPARATION_M = 304.8  # 1000 ft, vertical separation: mean tracks nearer than that, heights enlarged, are one flow
+CORRIDOR_M = (
+    1852.0  # half the width of RNAV 1, by which terminal procedures are flown: who is nearer is on the same way
+)
+ASIDE = 2.5  # times how near a flow's flights are to each other; who is further from all of them came alone
+_DENSE = 3  # flights, the flight itself too, within whose distance a way is a way that is flown
+_FINAL = 4  # last points of a track that tell its landing direction
 _THINNED = 400  # points of a track of which feature points are chosen
 _FASTEST_MPS, _STEEPEST_MPS = 400.0, 60.0  # nothing that arrives is faster: a point that would have to be is damage
 
@@ -58,11 +66,16 @@ class Flow:
 
 @dataclass(frozen=True, slots=True)
 class Flows:
-    """Flows, the largest first; of each track its flow's number, or OUTLIER, and how typical of it it is, 0 to 1."""
+    """Flows, the largest first; of each track (n,) its flow's number or OUTLIER, and how typical of it it is, 0 to 1.
+
+    `aside_m`: RMS distance of its way over the ground from the ways of the flow that it is most like; NaN where it is
+    like none, and where a method does not ask.
+    """
 
     flows: tuple[Flow, ...]
     labels: Integers
     membership: Floats
+    aside_m: Floats
 
 
 def cleaned(track: Track) -> Track:
@@ -102,23 +115,76 @@ def found(tracks: Sequence[Track], method: Method = "default", *, least_flights:
     """The flows of tracks that have been `cleaned`."""
     tracks = tuple(tracks)
     if len(tracks) < 2:
-        return Flows((), np.full(len(tracks), OUTLIER), np.zeros(len(tracks)))
+        return Flows((), np.full(len(tracks), OUTLIER), np.zeros(len(tracks)), np.full(len(tracks), math.nan))
     reach = float(np.median([distance_to_go(track)[0] for track in tracks]))
     places = np.stack([by_distance(track, max(reach, 1.0)) for track in tracks])
+    aside_m = np.full(len(tracks), math.nan)
     if method == "default":
-        labels = _by_shape(places, least_flights)
+        alike = _by_shape(places, least_flights)
+        aside_m = _aside(places[..., :2], alike)
+        labels = _typical(alike, aside_m, places[..., :2], least_flights)
     else:
         labels = _by_centres(tracks, method, least_flights)
-    return _described(_largest_first(labels), places, tracks)
+    return _described(_largest_first(labels), places, tracks, aside_m)
 
 
 def _by_shape(places: Floats, least_flights: int) -> Integers:
-    """HDBSCAN of whole tracks; the distance of two is their RMS distance over the points, heights ten times enlarged."""
+    """HDBSCAN of whole tracks; the distance of two is their RMS distance over the points, heights ten times enlarged.
+
+    Flights by chance closer to each other than to the rest of their flow would be a flow of their own, the sooner the fewer
+    make one: flows that controllers could not hold apart are joined.
+    """
     from sklearn.cluster import HDBSCAN
 
     scaled = places / [LEVEL_SCALE_M, LEVEL_SCALE_M, HEIGHT_SCALE_M] / np.sqrt(POINTS)
-    clusters = HDBSCAN(min_cluster_size=max(least_flights, 2), min_samples=2, copy=True)
-    return np.asarray(clusters.fit_predict(scaled.reshape(len(scaled), -1)), dtype=np.int64)
+    scaled = scaled.reshape(len(scaled), -1)
+    clusters = HDBSCAN(min_cluster_size=max(least_flights, 2), min_samples=min(_DENSE, len(scaled)), copy=True)
+    labels = np.asarray(clusters.fit_predict(scaled), dtype=np.int64)
+    numbers = range(int(labels.max(initial=OUTLIER)) + 1)
+    if len(numbers) < 2:
+        return labels
+    means = np.stack([scaled[labels == number].mean(axis=0) for number in numbers])
+    near = np.linalg.norm(means[:, None] - means, axis=-1) < SEPARATION_M / HEIGHT_SCALE_M
+    _, joined = connected_components(csr_array(near), directed=False)
+    return np.where(labels == OUTLIER, OUTLIER, joined[labels]).astype(np.int64)
+
+
+def _aside(ground: Floats, labels: Integers) -> Floats:
+    """RMS over each way (n, POINTS, 2) of the distance to the nearest other way of its flow (n,), m; NaN without a flow.
+
+    Another flight may be the nearest at each point: who is vectored leaves the way of one for that of another.
+    """
+    aside_m = np.full(len(ground), math.nan)
+    for number in range(int(labels.max(initial=OUTLIER)) + 1):
+        flights = np.flatnonzero(labels == number)
+        begins, steps = ground[flights, :-1], np.diff(ground[flights], axis=1)
+        lengths = np.maximum(np.sum(steps**2, axis=-1), 1e-9)
+        for place, flight in enumerate(flights.tolist()):
+            others = np.arange(len(flights)) != place
+            to = ground[flight][:, None, None] - begins[others]
+            share = np.clip(np.sum(to * steps[others], axis=-1) / lengths[others], 0.0, 1.0)
+            off = np.sum((to - share[..., None] * steps[others]) ** 2, axis=-1)
+            aside_m[flight] = math.sqrt(float(np.mean(off.min(axis=(1, 2)))))
+    return aside_m
+
+
+def _typical(labels: Integers, aside_m: Floats, ground: Floats, least_flights: int) -> Integers:
+    """Labels without those who only are more like this flow than like another.
+
+    Who lands against the flow's direction, and who is further aside than ASIDE times the flow's median, or than as
+    many corridors where the flow is narrower.
+    """
+    typical = labels.copy()
+    final = ground[:, -1] - ground[:, -1 - _FINAL]
+    final = final / np.maximum(np.linalg.norm(final, axis=-1, keepdims=True), 1e-9)
+    for number in range(int(labels.max(initial=OUTLIER)) + 1):
+        flights = np.flatnonzero(labels == number)
+        against = np.sum(final[flights] * np.median(final[flights], axis=0), axis=-1) < 0.0
+        far = aside_m[flights] > ASIDE * max(float(np.median(aside_m[flights])), CORRIDOR_M)
+        typical[flights[against | far]] = OUTLIER
+        if np.count_nonzero(typical == number) < least_flights:
+            typical[flights] = OUTLIER
+    return typical
 
 
 def _by_centres(tracks: Sequence[Track], method: Method, least_flights: int) -> Integers:
@@ -161,7 +227,7 @@ def _largest_first(labels: Integers) -> Integers:
     return np.array([renamed[number] for number in labels.tolist()], dtype=np.int64)
 
 
-def _described(labels: Integers, places: Floats, tracks: Sequence[Track]) -> Flows:
+def _described(labels: Integers, places: Floats, tracks: Sequence[Track], aside_m: Floats) -> Flows:
     flows, membership = [], np.zeros(len(tracks))
     for number in range(int(labels.max(initial=OUTLIER)) + 1):
         flights = np.flatnonzero(labels == number)
@@ -175,4 +241,4 @@ def _described(labels: Integers, places: Floats, tracks: Sequence[Track]) -> Flo
         flows.append(Flow(tuple(flights.tolist()), mean, spread, float(durations.mean()), float(durations.std())))
         scaled = np.sqrt(np.mean(np.sum((off / [LEVEL_SCALE_M, LEVEL_SCALE_M, HEIGHT_SCALE_M]) ** 2, axis=-1), axis=-1))
         membership[flights] = np.exp(-0.5 * (scaled / max(float(np.sqrt(np.mean(scaled**2))), 1e-9)) ** 2)
-    return Flows(tuple(flows), labels, membership)
+    return Flows(tuple(flows), labels, membership, aside_m)

@@ -22,6 +22,7 @@ def write_flows(tracks: Sequence[Track], flows: Flows, folder: Path) -> tuple[Pa
                 "flight": [track.name for track in tracks],
                 "flow": pa.array(numbers, pa.int64()),
                 "membership": pa.array(flows.membership),
+                "aside_m": pa.array(flows.aside_m, from_pandas=True),
                 "duration_s": pa.array([float(track.time_s[-1] - track.time_s[0]) for track in tracks]),
             }
         ),
