@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from enum import IntEnum
 
 from gateway import associate, fuse, predict, track
-from gateway.align import SECOND, Fix
+from gateway.align import SECOND
 from gateway.associate import Association
+from gateway.associating import Associating
 from gateway.fuse import Lane
 from gateway.fuse.consistency import Finding
 from gateway.making import NAMED_AT_MOST
 from gateway.observation import Heard
 from gateway.picture import Event
-from gateway.reckoning import Reckoning
-from gateway.register import WAIT_NS, gathered, remaining, residuals
+from gateway.register import WAIT_NS, gathered, residuals
 from gateway.track import RadarTracks
-from gateway.tracking import Tracked
 
 PLOT_MARGIN_S = 4.0  # plots are remembered this much longer than reports: a report's check looks back over them
 
@@ -40,10 +39,8 @@ TURN_NS = SECOND // 16
 READING_LANES = frozenset(Turn) - {Turn.REGISTERING, Turn.LOOKING_AT_RADARS, Turn.COMPARING}
 
 
-class Work(Reckoning):
+class Work(Associating):
     """The stages of one step; lives only inside `pipeline.step`, which calls them in order for each arrival."""
-
-    _nearby: associate.Nearby | None = None  # the radar tracks as columns, while no plot comes
 
     # what happens by itself ---------------------------------------------------------------------------------------
 
@@ -58,10 +55,10 @@ class Work(Reckoning):
         if self.now is None or now < self.now - self.history:
             self._start_again(now)
         due = self._next_check()
-        while (at := min(self.instant, due, self.predicting.due, self.consistency.due)) < now or (
-            at == now and watermark
-        ):
+        while (at := min(self.instant, due, self._planned_due)) < now or (at == now and watermark):
             self.now = max(at, self.now or at)
+            if at == self.reckoners.due:
+                self._reckon_share(at)
             if at == self.predicting.due:
                 self._foretell(at)
             self._judge(at)
@@ -81,6 +78,11 @@ class Work(Reckoning):
             due = self._next_check()
         self.now = max(now, self.now or now)
         self.events += [Event(now, level, text) for level, text in arrival.notes]
+
+    @property
+    def _planned_due(self) -> int:
+        """When the next share is due of what is spread over the second."""
+        return min(self.predicting.due, self.consistency.due, self.reckoners.due)
 
     def _in_turn(self, turn: int, at: int) -> None:
         """What is done once a second between the whole seconds: of a crowd it would hold up for long what comes, all at once."""
@@ -120,7 +122,13 @@ class Work(Reckoning):
         self.lived += lived
         self.events += [Event(at, "info", text) for one in lived if (text := fuse.sentence(one, lanes)) is not None]
         self.lanes = lanes
-        silent = [lane for lane in self._alive() if lane.last.at < at and lane.coasting_at(at, self.options)]
+        silent = [
+            lane
+            for lane in self._alive()
+            if lane.last.at < at
+            and lane.coasting_at(at, self.options)
+            and not (lane.aircraft and self.reckoners.follows(lane.aircraft, at))
+        ]
         self.rows += self._with_wind(fuse.coast(silent, at, self._spans, self.geoid.separation_m, self.model))
 
     def _alive(self) -> list[Lane]:
@@ -182,90 +190,6 @@ class Work(Reckoning):
         self.consistency = self.consistency.again()
         # An arrival stamped at a whole second comes before what happens at that second.
         self.now, self.instant = now, (now - 1) // SECOND * SECOND + SECOND
-
-    # associate ----------------------------------------------------------------------------------------------------
-
-    def associate(self, fixes: Sequence[Fix], tracked: Tracked) -> None:
-        """Reports wait for the plots about them; plots that came late repeat the checks they touch; what is due is checked."""
-        for fix in fixes:
-            self.association = associate.await_plots(self.association, fix)
-        for plot, key in tracked:
-            self._move(associate.check_again(self.association, plot, key, self.tracks, self.setting))
-        self._check_due()
-
-    def _next_check(self) -> int:
-        due, scan = self.association.due, self.unnumbered.due
-        return min(1 << 63 if due is None else due.at + self.wait, 1 << 63 if scan is None else scan)
-
-    def _track_due(self) -> None:
-        """The unnumbered plots whose wait is over: those of confirmed tracks go on as numbered ones do."""
-        if self.unnumbered.due is None or self.unnumbered.due > (self.now or 0):
-            return
-        told, back = self.due_tracks()
-        for plot, key in back:
-            self._settle()
-            self._move(associate.check_again(self.association, plot, key, self.tracks, self.setting))
-            self._work_in(*fuse.give_back(self.lanes, plot, key, self._scene()))
-            self._settle()
-        self.associate((), told)
-        self.fuse((), told)
-
-    def _check_due(self) -> None:
-        """The checks whose wait is over."""
-        until = (self.now or 0) - self.wait
-        while (fix := self.association.due) is not None and fix.at <= until:
-            if self._nearby is None or self._nearby.tracks is not self.tracks:
-                self._nearby = associate.Nearby(self.tracks)
-            after, made = associate.check_due(self.association, until, self._nearby, self.setting)
-            self.checks += made
-            self._move(after)
-
-    def _move(self, after: Association) -> None:
-        """A new state of association: the plots of pairs made, lost or moved in time change their system tracks."""
-        old, known = self.association, self._spans
-        if after is old:
-            return
-        if after.ledger.spans != old.ledger.spans:
-            self._settle()  # what waits is written under the pairs that were known when it was heard
-        self.association = after
-        if after.ledger.spans == old.ledger.spans:
-            return
-        self._reroute(known, self.now or 0)
-        for change in (change for check in after.checks for change in check.changes if change not in self.reported):
-            self.reported |= {change}
-            self.changes.append(change)
-            verb = "is" if change.kind == "associated" else "is no longer"
-            self.events.append(Event(change.at, "info", f"{change.aircraft} {verb} radar track {change.radar_track}"))
-
-    def _look_at_radars(self, at: int) -> None:
-        """Where the radar tracks of several radars are."""
-        if len(self.radars) > 1:
-            state = associate.looked(self.association.together, at, self.tracks, self.radar_frames)
-            self.association = replace(self.association, together=state)
-
-    def _compare_radars(self, at: int) -> None:
-        """Which of them are one target."""
-        allowed = remaining(self.registration, self.radars, at)
-        state = associate.compared(self.association.together, self.tracks, allowed)
-        self.association = replace(self.association, together=state)
-
-    def _join_radars(self, at: int) -> None:
-        """Those that were found to be one target, brought into one system track; and others out of it."""
-        state, seen = self.association.together, self.association.together.seen
-        if seen is None:
-            return
-        self.association = replace(self.association, together=replace(state, seen=None))
-        known, found = self._spans, self.association.ledger.spans
-        found = fuse.spans_with(found, self.lanes.adopted) if self.lanes.adopted else found
-        groups, alive = associate.together(seen.keys, state.one), frozenset(seen.keys)
-        done = fuse.regrouped(self.lanes, groups, alive, found, known, self.tracks, at)
-        if done.lanes is not self.lanes:
-            self.events += [Event(at, "info", text) for text in done.told]
-            self.lanes = done.lanes
-            self._reroute(known, at)
-        theirs = fuse.radar_tracks_of_aircraft(self.lanes, self._spans, seen.keys)
-        allowed = remaining(self.registration, self.radars, at)
-        self.of_radars.append(associate.combined(seen, theirs, allowed, self.frame))
 
     # register -----------------------------------------------------------------------------------------------------
 
