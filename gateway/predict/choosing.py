@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,9 +10,11 @@ from numpy.typing import NDArray
 
 from gateway.estimators.circling import ON_CIRCLE, Circles
 from gateway.estimators.intent import BELIEVED, USED_IN_TURN_RAD, Belief, Seen, to_turn
+from gateway.estimators.turns_and_straights import or_zero
 from gateway.geodesy import wrap_rad
-from gateway.predict.goals import GO_AROUND, RUNWAY, Goals
+from gateway.predict.goals import GO_AROUND, RUNWAY
 from gateway.predict.minds import Minds
+from gateway.predict.stacked import Stacked
 from gateway.predict.table import DECLARED, INFERRED, NONE
 from gateway.predict.thinking import Motions, inferred, trusted
 from gateway.settings import Site
@@ -57,18 +58,16 @@ class _Declared:
     radius: Floats  # NaN = it is not flown round, or at a radius that nobody says
 
     @classmethod
-    def of(cls, goals: Sequence[Goals], routes: Floats) -> _Declared:
+    def of(cls, goals: Stacked) -> _Declared:
         """As the goals have it."""
-        place = np.array([one.declared for one in goals], dtype=np.int64)
-        said = np.maximum(place, 0)
-        each = list(zip(goals, said.tolist(), strict=True))
+        rows, said = np.arange(len(goals.declared)), np.maximum(goals.declared, 0)
         return cls(
-            place,
-            np.array([one.declared_at for one in goals], dtype=np.int64),
-            np.where((place >= 0)[:, None], routes[np.arange(len(goals)), said, 0], math.nan),
-            np.array([one.circles[slot] for one, slot in each]),
-            np.array([one.rounds[slot] for one, slot in each]),
-            np.array([one.radius[slot, 0] for one, slot in each]),
+            goals.declared,
+            goals.declared_at,
+            np.where((goals.declared >= 0)[:, None], goals.route[rows, said, 0], math.nan),
+            goals.circles[rows, said],
+            goals.rounds[rows, said],
+            goals.radius[rows, said, 0],
         )
 
 
@@ -76,6 +75,7 @@ class _Declared:
 class _Flown:
     """How n aircraft fly to one candidate each, as `Goals` has it."""
 
+    route: Floats  # (n, 4, 2)
     up: Floats  # (n, 4)
     lands: Bools  # (n, 4)
     ends_round: Bools  # (n,)
@@ -83,28 +83,21 @@ class _Flown:
     least: Floats  # (n, 4)
 
     @classmethod
-    def of(cls, goals: Sequence[Goals], slots: Ints) -> _Flown:
+    def of(cls, goals: Stacked, slots: Ints) -> _Flown:
         """To these candidates (n,)."""
-        each = list(zip(goals, slots.tolist(), strict=True))
-        return cls(
-            np.stack([one.up[slot] for one, slot in each]),
-            np.stack([one.lands[slot] for one, slot in each]),
-            np.array([one.rounds[slot] for one, slot in each]),
-            np.stack([one.radius[slot] for one, slot in each]),
-            np.stack([one.least[slot] for one, slot in each]),
-        )
+        at = np.arange(len(slots)), slots
+        return cls(goals.route[at], goals.up[at], goals.lands[at], goals.rounds[at], goals.radius[at], goals.least[at])
 
 
 def chosen(
-    before: Minds, minds: Minds, at: int, now: Motions, goals: Sequence[Goals], climb: Floats, site: Site
+    before: Minds, minds: Minds, at: int, now: Motions, goals: Stacked, climb: Floats, site: Site
 ) -> tuple[Chosen, Minds]:
     """What is believed of n aircraft that climb so fast (n,), and what is thought of them from now on."""
-    routes = np.stack([one.route for one in goals])
-    declared = _Declared.of(goals, routes)
-    seen, belief, off = _inferred(before, at, now, goals, routes, climb, site)
+    declared = _Declared.of(goals)
+    seen, belief, off = _inferred(before, at, now, goals, climb, site)
     trust = trusted(before, at, now, declared.goal, declared.circles, declared.since)
-    trusts = np.nan_to_num(trust) >= TRUSTED
-    left = to_turn(np.take_along_axis(np.nan_to_num(off), np.maximum(belief.best, 0)[:, None], axis=1), now.side)[:, 0]
+    trusts = or_zero(trust) >= TRUSTED
+    left = to_turn(np.take_along_axis(or_zero(off), np.maximum(belief.best, 0)[:, None], axis=1), now.side)[:, 0]
     infers = (
         ~trusts & (belief.best >= 0) & (belief.direction > BELIEVED) & ((now.side == 0) | (left < USED_IN_TURN_RAD))
     )
@@ -121,7 +114,7 @@ def chosen(
         last=seen.last,
         turning=seen.turning,
         flown_at=seen.flown_at,
-        trust=np.nan_to_num(trust),
+        trust=or_zero(trust),
         declared_at=np.where(is_said, declared.since, before.declared_at),
         circled=circled,
     )
@@ -130,7 +123,7 @@ def chosen(
     least = flown.least
     least[:, 0] = np.maximum(least[:, 0] - np.where(best == declared.place, circled, 0.0), 0.0)
     way = Chosen(
-        np.where((used & ~circling)[:, None, None], routes[np.arange(len(goals)), slots], math.nan),
+        np.where((used & ~circling)[:, None, None], flown.route, math.nan),
         np.where(used[:, None], flown.up, math.nan),
         flown.lands & used[:, None],
         circling,
@@ -147,22 +140,22 @@ def chosen(
 
 def _shares(inferred_share: Floats, declared: Ints, trust: Floats) -> Floats:
     """How probably (n, c) each candidate is flown to: what is declared as far as it is trusted, the others share the rest."""
-    rest = np.where(declared >= 0, 1.0 - np.nan_to_num(trust), 1.0)
-    share = np.nan_to_num(inferred_share) * rest[:, None]
+    rest = np.where(declared >= 0, 1.0 - or_zero(trust), 1.0)
+    share = or_zero(inferred_share) * rest[:, None]
     said = np.flatnonzero(declared >= 0)
     share[said, declared[said]] = trust[said]
     return np.asarray(share)
 
 
 def _inferred(
-    before: Minds, at: int, now: Motions, goals: Sequence[Goals], routes: Floats, climb: Floats, site: Site
+    before: Minds, at: int, now: Motions, goals: Stacked, climb: Floats, site: Site
 ) -> tuple[Seen, Belief, Floats]:
     """`thinking.inferred`, in which only who is on final lands or goes around."""
     final = _on_final(now, site)
-    lowered = np.stack([one.lowered for one in goals])
+    lowered = goals.lowered.copy()
     lowered[:, RUNWAY] *= final
     lowered[:, GO_AROUND] *= final * _goes_around(now, climb, site)
-    return inferred(before, at, now, routes[:, :, 0], np.stack([one.planned for one in goals]), lowered)
+    return inferred(before, at, now, goals.route[:, :, 0], goals.planned, lowered)
 
 
 def _circling(now: Motions, centre: Floats, should: Bools) -> tuple[Bools, Floats]:
@@ -180,7 +173,7 @@ def _circled(before: Minds, now: Motions, declared: _Declared) -> Floats:
     way = declared.goal - now.position
     near = np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1]) <= ON_CIRCLE * np.abs(declared.radius)
     turned = np.abs(wrap_rad(now.course - before.courses[:, 0]))
-    return np.where(near & (before.declared_at == declared.since), before.circled + np.nan_to_num(turned), 0.0)
+    return np.where(near & (before.declared_at == declared.since), before.circled + or_zero(turned), 0.0)
 
 
 def _on_final(now: Motions, site: Site) -> Bools:

@@ -61,18 +61,19 @@ def forecast(
     predicting = predicting.with_goals(lanes, site, frame, separation_m)
     told = predicting.tellings.by_aircraft
     goals = [predicting.goals[lane.aircraft if lane.aircraft in told else None] for lane in lanes]
-    tracks = tuple(lane.track for lane in lanes)
+    tracks, numbers = tuple([lane.track for lane in lanes]), tuple([lane.number for lane in lanes])
     before = predicting.remembered.of(tracks)
     state = State.of(lanes, at, model)
-    gates, judged = _on_final(predicting.gates, lanes, at, state, site, frame)
+    gates, judged = _on_final(predicting.gates, tracks, numbers, lanes, at, state, site, frame)
     goals = weather.around(goals, state, weather.areas(predicting.tellings, site, frame, at, separation_m))
+    predicting, stacked = predicting.stacked(lanes[0].track, goals)
     usual = level_turn_rate(state.speed, site.estimation.bank_rad, site.estimation.turn_rate_rps)
     winds = _winds(predicting, lanes, at)
     through_air = np.sqrt(((state.velocity - winds) ** 2).sum(axis=1))
     now, minds = motions(
         before, at, state.position, state.velocity, state.velocity_sigma, state.sides, usual, through_air
     )
-    way, minds = chosen(before, minds, at, now, goals, state.climb, site)
+    way, minds = chosen(before, minds, at, now, stacked, state.climb, site)
     horizons = state.since_s[:, None] + np.array(horizons_s)
     start = two_segment.Moving(state.at_position, state.velocity, np.where(way.circles, way.rate, now.turn_rate))
     around = beside(horizons)
@@ -102,12 +103,11 @@ def forecast(
     mean = np.concatenate([ahead.position, up[..., None]], axis=2)
     known_s, reported = around - state.since_s[:, None], np.array([lane.aircraft is not None for lane in lanes])
     settled = np.array([lane.aircraft is not None or at - lane.began >= SETTLES for lane in lanes])
-    tracks_told = [lane.number for lane in lanes]
-    ways = ways_of(tracks_told, at, state, whole, known_s, up, sigma, horizons_s, by_points, settled, reported, frame)
+    ways = ways_of(numbers, at, state, whole, known_s, up, sigma, horizons_s, by_points, settled, reported, frame)
     told_names = [one.names[best] if best >= 0 else None for one, best in zip(goals, way.best.tolist(), strict=True)]
     made = Forecast(
         at,
-        tuple(lane.number for lane in lanes),
+        numbers,
         horizons_s,
         mean,
         ahead.course,
@@ -120,21 +120,26 @@ def forecast(
         way.confidence,
         ways,
         judged,
-        weighed(at, tracks_told, goals, way.share),
+        weighed(at, numbers, goals, way.share),
     )
     return replace(predicting, remembered=predicting.remembered.after(tracks, minds), gates=gates), made
 
 
 def _on_final(
-    gates: Gates, lanes: Sequence[Lane], at: int, state: State, site: Site, frame: RunwayFrame
+    gates: Gates,
+    tracks: Sequence[int],
+    numbers: Sequence[int],
+    lanes: Sequence[Lane],
+    at: int,
+    state: State,
+    site: Site,
+    frame: RunwayFrame,
 ) -> tuple[Gates, Judged | None]:
     """Who of some tracks is not stabilised on final."""
     place = np.concatenate([state.position, (state.up + state.climb * state.since_s)[:, None]], axis=1)
     velocity = np.concatenate([state.velocity, state.climb[:, None]], axis=1)
-    numbers = [lane.number for lane in lanes]
-    names = [f"track {lane.number}" + (f" ({lane.aircraft})" if lane.aircraft else "") for lane in lanes]
-    tracks = [lane.track for lane in lanes]
-    return gates.judged(at, tracks, numbers, names, place, velocity, state.has_height, site.stabilised, frame)
+    aircraft = [lane.aircraft for lane in lanes]
+    return gates.judged(at, tracks, numbers, aircraft, place, velocity, state.has_height, site.stabilised, frame)
 
 
 def _rests(way: Chosen, whole: two_segment.Ahead) -> Ints:

@@ -172,7 +172,7 @@ class Gates:
         at: int,
         tracks: Sequence[int],
         numbers: Sequence[int],
-        names: Sequence[str],
+        aircraft: Sequence[str | None],
         place_enu: Floats,
         velocity: Floats,
         has_height: Bools,
@@ -181,7 +181,7 @@ class Gates:
     ) -> tuple[Gates, Judged | None]:
         """One instant of tracks at (n, 3) with (n, 3) m/s; None where nobody is or was on final.
 
-        `numbers` are those that people know the tracks by, `names` what they are called.
+        `numbers` are those that people know the tracks by, `aircraft` who they are.
         """
         place, flies = turn(frame.runway_from_enu, place_enu), turn(frame.runway_from_enu, velocity)
         off = deviations(frame.runway, place, flies[:, 0])
@@ -202,7 +202,8 @@ class Gates:
                 continue
             one = (float(off.distance_m[row]), float(off.vertical_m[row]), float(off.lateral_m[row]))
             finals[track], seen = _judged(known, at, one, float(speed[row]), float(place[row, 2]), limits, frame.runway)
-            said += _said(known, finals[track], seen, names[row], one, limits, frame.runway)
+            name = f"track {numbers[row]}" + (f" ({aircraft[row]})" if aircraft[row] else "")
+            said += _said(known, finals[track], seen, name, one, limits, frame.runway)
             standing += [
                 (
                     numbers[row],

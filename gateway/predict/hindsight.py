@@ -40,25 +40,26 @@ def learnt(minds: Minds, at: int, state: State, horizons_s: tuple[float, ...]) -
     due_at = minds.due_at
     late_s = (at - due_at) / SECOND
     due = (late_s >= 0.0) & (late_s < 1.0) & (state.since_s <= FRESH_S)[:, None, None]
-    late_s = np.where(due, late_s, 0.0)[..., None]
-    off = state.position[:, None, None] - late_s * state.velocity[:, None, None] - minds.foretold[..., 0:2]
-    cosine, sine = np.cos(minds.foretold[..., 2]), np.sin(minds.foretold[..., 2])
-    along = np.abs(off[..., 0] * cosine + off[..., 1] * sine) / np.maximum(minds.foretold[..., 3], LEAST_SIGMA_M)
-    across = np.abs(off[..., 1] * cosine - off[..., 0] * sine) / np.maximum(minds.foretold[..., 4], LEAST_SIGMA_M)
-    sigmas = np.minimum(np.where(due[..., None], np.stack([along, across], axis=-1), 0.0), AT_MOST)
-    worth = np.array([_every(horizon) / horizon for horizon in horizons_s[:LEARNT]])
+    row, horizon, place = np.nonzero(due)  # of most instants nothing comes due
+    if not len(row):
+        return minds
+    foretold = minds.foretold[row, horizon, place]
+    off = state.position[row] - late_s[row, horizon, place][:, None] * state.velocity[row] - foretold[:, 0:2]
+    cosine, sine = np.cos(foretold[:, 2]), np.sin(foretold[:, 2])
+    along = np.abs(off[:, 0] * cosine + off[:, 1] * sine) / np.maximum(foretold[:, 3], LEAST_SIGMA_M)
+    across = np.abs(off[:, 1] * cosine - off[:, 0] * sine) / np.maximum(foretold[:, 4], LEAST_SIGMA_M)
+    worth = np.array([_every(one) / one for one in horizons_s[:LEARNT]])
     worth = np.concatenate([worth, np.zeros(LEARNT - len(worth))])
-    told, weight = [], []
-    for turns in (0.0, 1.0):
-        these = due & (minds.foretold[..., 5] == turns)
-        told.append((sigmas * these[..., None]).sum(axis=2) * worth[:, None])
-        weight.append(these.sum(axis=2) * worth)
-    counted = np.stack(weight, axis=1)
+    slots = row, (foretold[:, 5] == 1.0).astype(np.int64), horizon
+    sigmas, counted = np.zeros(minds.sigmas.shape), np.zeros(minds.counted.shape)
+    np.add.at(sigmas, slots, np.minimum(np.stack([along, across], axis=-1), AT_MOST))
+    np.add.at(counted, slots, 1.0)
+    sigmas, counted = sigmas * worth[:, None], counted * worth
     keep = np.exp(-counted / MEMORY)
     return replace(
         minds,
         due_at=np.where(due, NOT_KEPT, due_at),
-        sigmas=minds.sigmas * keep[..., None] + np.stack(told, axis=1),
+        sigmas=minds.sigmas * keep[..., None] + sigmas,
         counted=minds.counted * keep + counted,
     )
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
-from types import MappingProxyType
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,6 @@ UNKNOWN = -(1 << 62)
 GUSTS_AT_FIRST = 0.2  # m2/s2
 LEARNT, KEPT = 4, 5  # the first horizons, of each of which so many predictions are kept until they come due
 NOT_KEPT = 1 << 62
-NOBODY: Mapping[int, int] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,56 +87,52 @@ class Minds:
         """Some of the rows."""
         return Minds(*(getattr(self, one.name)[rows] for one in fields(self)))
 
+    @classmethod
+    def joined(cls, parts: Sequence[Minds]) -> Minds:
+        """Some minds behind others."""
+        return cls(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(cls)))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Remembered:
-    """The minds of all tracks, by the rows that they are in."""
+    """The minds of all tracks, in the parts in which they were thought of last: mostly the parts of the next round too."""
 
-    rows: Mapping[int, int] = field(default_factory=lambda: NOBODY)
-    minds: Minds = field(default_factory=lambda: Minds.empty(0))
+    parts: tuple[tuple[tuple[int, ...], Minds], ...] = ()  # no track is in two
 
     def of(self, tracks: Sequence[int]) -> Minds:
-        """The minds of some tracks, new ones for those that have none."""
-        rows = np.array([self.rows.get(track, -1) for track in tracks], dtype=np.int64)
-        found, new = self.minds.taken(np.maximum(rows, 0)) if len(self.rows) else Minds.empty(len(rows)), rows < 0
-        if not new.any() or not len(self.rows):
-            return found
-        empty = Minds.empty(len(rows))
-        chosen = [
-            np.where(_along(new, getattr(empty, one.name)), getattr(empty, one.name), getattr(found, one.name))
-            for one in fields(found)
-        ]
-        return Minds(*chosen)
+        """The minds of some tracks, at least one and each once; new ones for those that have none."""
+        wanted = tuple(tracks)
+        known = next((minds for part, minds in self.parts if part == wanted), None)
+        if known is not None:
+            return known
+        places = {track: place for place, track in enumerate(wanted)}
+        found, order = [], []
+        for part, minds in self.parts:
+            rows = [row for row, track in enumerate(part) if track in places]
+            if rows:
+                found.append(minds.taken(np.array(rows)))
+                order += [places.pop(part[row]) for row in rows]
+        whole = Minds.joined([*found, Minds.empty(len(places))])
+        return whole.taken(np.argsort([*order, *places.values()]))
 
     def after(self, tracks: Sequence[int], minds: Minds) -> Remembered:
         """The same with some tracks' minds changed."""
-        new = [track for track in tracks if track not in self.rows]
-        rows, whole = self.rows, self.minds
-        if new:
-            rows = {**rows, **{track: len(rows) + place for place, track in enumerate(new)}}
-            more = Minds.empty(len(new))
-            whole = Minds(
-                *(np.concatenate([getattr(whole, one.name), getattr(more, one.name)]) for one in fields(whole))
-            )
-        return Remembered(rows, _put(whole, np.array([rows[track] for track in tracks], dtype=np.int64), minds))
+        changed = tuple(tracks)
+        if any(part == changed for part, _ in self.parts):
+            return Remembered(tuple((part, minds if part == changed else one) for part, one in self.parts))
+        others = self._only(set().union(*(part for part, _ in self.parts)).difference(changed))
+        return Remembered((*others.parts, (changed, minds)))
 
     def without(self, alive: Mapping[int, object]) -> Remembered:
         """The same without the minds of tracks that are not alive."""
-        kept = [track for track in self.rows if track in alive]
-        if len(kept) == len(self.rows):
-            return self
-        rows = np.array([self.rows[track] for track in kept], dtype=np.int64)
-        return Remembered({track: row for row, track in enumerate(kept)}, self.minds.taken(rows))
+        return self._only(alive)
 
-
-def _along(rows: NDArray[np.bool_], values: NDArray[np.generic]) -> NDArray[np.bool_]:
-    return rows.reshape(-1, *(1,) * (values.ndim - 1))
-
-
-def _put(minds: Minds, rows: Ints, some: Minds) -> Minds:
-    columns = []
-    for one in fields(minds):
-        column = getattr(minds, one.name).copy()
-        column[rows] = getattr(some, one.name)
-        columns.append(column)
-    return Minds(*columns)
+    def _only(self, kept: Container[int]) -> Remembered:
+        parts = []
+        for part, minds in self.parts:
+            rows = [row for row, track in enumerate(part) if track in kept]
+            if len(rows) == len(part):
+                parts.append((part, minds))
+            elif rows:
+                parts.append((tuple([part[row] for row in rows]), minds.taken(np.array(rows))))
+        return Remembered(tuple(parts))

@@ -14,6 +14,7 @@ from gateway.observation import WeatherArea
 from gateway.predict.gates import Gates
 from gateway.predict.goals import Goals, goals_of
 from gateway.predict.minds import Remembered
+from gateway.predict.stacked import Stacked
 from gateway.predict.told import Said, Tellings
 from gateway.settings import Site
 
@@ -32,6 +33,7 @@ class Predicting:
     separation_m: float = 0.0  # of the geoid, as the goals have it
     planned: tuple[tuple[int, tuple[int, ...]], ...] = ()  # when which tracks are predicted next
     gates: Gates = Gates()  # what is remembered of finals
+    stacks: Mapping[int, Stacked] = field(default_factory=dict)  # goals of parts, by their first tracks
     headings: Headings = Headings()  # where aircraft say they go, as the filter of several modes uses it
 
     @property
@@ -44,10 +46,11 @@ class Predicting:
         of the second after it.
         """
         parts = [tuple(tracks[first : first + TOGETHER]) for first in range(0, len(tracks), TOGETHER)]
+        stacks = {part[0]: self.stacks[part[0]] for part in parts if part[0] in self.stacks}
         if len(tracks) <= FEW:
-            return replace(self, planned=tuple((at, part) for part in parts))
+            return replace(self, planned=tuple((at, part) for part in parts), stacks=stacks)
         middles = (at + (2 * place + 1) * SECOND // (2 * len(parts)) for place in range(len(parts)))
-        return replace(self, planned=tuple(zip(middles, parts, strict=True)))
+        return replace(self, planned=tuple(zip(middles, parts, strict=True)), stacks=stacks)
 
     def begun(self, at: int) -> tuple[Predicting, tuple[int, ...]]:
         """The same without the part that is due at an instant, and its tracks."""
@@ -80,6 +83,14 @@ class Predicting:
             return self
         made = {one: goals_of(told.get(one) if one else None, site, frame, separation_m) for one in missing}
         return replace(self, goals={**goals, **made}, separation_m=separation_m)
+
+    def stacked(self, first: int, goals: Sequence[Goals]) -> tuple[Predicting, Stacked]:
+        """The goals of a part that begins with a track, and the same with them remembered."""
+        known = self.stacks.get(first)
+        if known is not None and known.is_of(goals):
+            return self, known
+        made = Stacked.of(goals)
+        return replace(self, stacks={**self.stacks, first: made}), made
 
     def heading(self, at: int, before: int) -> Predicting:
         """The same with where aircraft say at an instant that they go told to the filter; `before` nobody asks any more."""

@@ -94,7 +94,7 @@ def spread(
     wanders = WANDERS_S**2 * np.where(turned > ON_LINE_RAD, 1.0, 2.0 * (1.0 - np.exp(-t / WANDERS_FOR_S)))
     swings = (SWINGS * lately_s) ** 2 + (SWINGS_NOW * in_turn_s) ** 2 * np.exp(-t / SWINGS_FOR_S)
     beside_s = wanders + swings + (WANDERS_A_TURN * turns_s) ** 2 + ends_across * ends_across
-    doubt = np.maximum(DOUBTED - np.nan_to_num(confidence, nan=DOUBTED), 0.0)[:, None]
+    doubt = np.maximum(DOUBTED - np.where(np.isnan(confidence), DOUBTED, confidence), 0.0)[:, None]
     unknown = MANOEUVRES * speed * speed * np.where(by_model, 1.0, doubt) * t**3
     place = place_sigma[:, None] ** 2 + np.where(kind == ROUND_A_POINT, (0.25 * speed * t) ** 2, 0.0)
     gains = (ACCELERATES_S * now.acceleration[:, None]) ** 2 + np.where(

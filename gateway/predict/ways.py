@@ -119,13 +119,15 @@ def path_on(times_s: Floats, known_s: Floats, place: Floats, course: Floats) -> 
 
     A cubic through two places with their courses, as long as an arc from one to the other; the courses are not wrapped.
     """
-    order = np.argsort(known_s, axis=1, kind="stable")
-    known = np.take_along_axis(known_s, order, axis=1)
-    first = np.clip((known[:, :, None] <= times_s).sum(axis=1) - 1, 0, known.shape[1] - 2)
+    n, k = known_s.shape
+    begins = k * np.arange(n)[:, None]
+    order = np.argsort(known_s, axis=1, kind="stable") + begins
+    known = known_s.take(order)
+    first = np.clip((known[:, :, None] <= times_s).sum(axis=1) - 1, 0, k - 2) + begins
+    before, after = order.take(first), order.take(first + 1)
 
     def ends(values: Floats) -> tuple[Floats, Floats]:
-        ordered = np.take_along_axis(values, order, axis=1)
-        return np.take_along_axis(ordered, first, axis=1), np.take_along_axis(ordered, first + 1, axis=1)
+        return values.take(before), values.take(after)
 
     (before_s, after_s), (east, next_east), (north, next_north), (heading, next_heading) = map(
         ends, (known_s, place[..., 0], place[..., 1], course)
