@@ -38,7 +38,7 @@ def test_the_alpha_beta_gamma_study_fills_its_tables_and_draws(tmp_path: Path, m
 def test_the_prediction_study_fills_its_tables_and_draws(tmp_path: Path) -> None:
     """Two runs give every table rows as wide as its headings, literal and default among them, and a recording."""
     found = prediction.run(2, 1, rrd=tmp_path / "figures.rrd")
-    assert len(found.tables) == 5
+    assert len(found.tables) == 6
     for table in found.tables:
         assert table.rows
         assert {len(row) for row in table.rows} == {len(table.columns)}

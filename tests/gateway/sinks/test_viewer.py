@@ -118,7 +118,10 @@ def shows(view: rrb.View, path: str) -> bool:
 
 
 def test_every_view_has_rows_from_early_on(session):
-    """In each part of the session, each view has new rows: what it shows is not left over from the beginning."""
+    """In each part of the session, each view has new rows: what it shows is not left over from the beginning.
+
+    But for one: what dead reckoning says is drawn of vehicles that tell inertial samples, and this one tells none.
+    """
     path, first, last = session
     rows = {}
     for chunk in RrdReader(path).stream():
@@ -126,9 +129,12 @@ def test_every_view_has_rows_from_early_on(session):
             utc = chunk.to_record_batch().column("utc").cast("int64").to_numpy()
             rows.setdefault(chunk.entity_path, []).append(utc)
     views = list(views_of(blueprint(DEMO_SITE, modes=True).root_container))
-    assert len({view.name for view in views}) == len(views) == 32
+    assert len({view.name for view in views}) == len(views) == 33
     for view in views:
         mine = [utc for name, parts in rows.items() if shows(view, name) for utc in parts]
+        if view.name == "Without GPS, m":
+            assert not mine
+            continue
         assert mine, view.name
         utc = np.concatenate(mine)
         for part in PARTS:
