@@ -23,25 +23,33 @@ class Reckoning(Fusing):
     """A step that knows where vehicles are that tell how they move."""
 
     def _reckon(self, at: int) -> None:
-        """Everything that was told before an instant; and where positions are missing or denied, the tracks that go on by it."""
-        if self.options.dead_reckoning == "off" or not (self.reckoners.waiting or self.reckoners.by_aircraft):
+        """At a whole second: all vehicles go on; of many the first ones, the others later in the second."""
+        if self.options.dead_reckoning == "off" or self.reckoners.is_idle:
             return
-        self._settle()
-        before = self.reckoners
-        self.reckoners = before.advanced(at, self.history, self.site.dead_reckoning)
+        self.reckoners = self.reckoners.planning(at)
         if self.reckoners.crowded:
             self.once("more vehicles tell how they move than are followed by dead reckoning: the others are not")
-        for aircraft in self.reckoners.by_aircraft:
-            found = self.reckoners.of(aircraft, at)
-            self._tell_denied(aircraft, before.denied(aircraft), self.reckoners.denied(aircraft), at)
+        if self.reckoners.due == at:
+            self._reckon_share(at)
+
+    def _reckon_share(self, now: int) -> None:
+        """The vehicles that are due; and where positions are missing or denied, their tracks go on by dead reckoning."""
+        self._settle()
+        before, share = self.reckoners, self.reckoners.planned[0][1]
+        self.reckoners = before.advanced(self.history, self.site.dead_reckoning)
+        for aircraft in share.names:
+            found = self.reckoners.of(aircraft, share.at)
+            self._tell_denied(aircraft, before.denied(aircraft), self.reckoners.denied(aircraft), now)
             lane = self.lanes.lanes.get(self.lanes.by_aircraft.get(aircraft, 0))
             if found is None or lane is None or not lane.events or lane.ended_at is not None:
                 continue
             self.reckoned.append(found)
-            newly = found.denied != NOTHING and before.denied(aircraft) == NOTHING
-            if lane.coasting_at(at, self.options) or newly:
-                self._go_on(lane, found, is_forced=newly)
-            elif at - found.heard_at > GPS_GONE_S * SECOND and at - lane.last.radar_at <= SECOND * 2:
+            if found.denied != NOTHING and before.denied(aircraft) == NOTHING:
+                # also what has come since the second, and has entered the track, is not believed
+                self._go_on(lane, self.reckoners.of(aircraft, now) or found, is_forced=True)
+            elif lane.coasting_at(share.at, self.options):
+                self._go_on(lane, found, is_forced=False)
+            elif share.at - found.heard_at > GPS_GONE_S * SECOND and share.at - lane.last.radar_at <= SECOND * 2:
                 self._show(lane, aircraft)
         self._settle()
 

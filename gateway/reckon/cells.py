@@ -1,12 +1,14 @@
 """The time of dead reckoning: cells of a tenth of a second, and what a vehicle told in each.
 
 Within a cell the unit's rate and force are their means, of samples joined by straight lines, however often they come. What
-else was told in a cell is brought to the cell's end.
+else was told in a cell is brought to the cell's end. The filters go through a block of cells at once, of many vehicles.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,7 @@ from gateway.reckon.told import AIRSPEED, ALTITUDE, ATTITUDE, PLACE, Series, Tol
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+SECOND = 1_000_000_000
 CELL_NS = 100_000_000
 CELL_S = CELL_NS / 1e9
 SECOND_CELLS = 10
@@ -163,3 +166,57 @@ def _first_of_blocks(series: Series, first: int, n: int) -> tuple[Floats, Floats
     values[cell] = series.values[begin:over][chosen]
     late[cell] = ((cell + first + 1) * CELL_NS - at[chosen]) / 1e9
     return values, late
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Block:
+    """One block of n vehicles: m cells of each (n, m, ...), and what was told in them last, or first, at the block's end."""
+
+    rate: Floats
+    force: Floats
+    unseen: Floats
+    turned: Floats
+    attitude: Floats
+    airspeed: Floats
+    altitude: Floats
+    place: Floats
+    place_late: Floats
+    pictured: Floats
+    pictured_late: Floats
+
+    @classmethod
+    def of(cls, inputs: Sequence[Cells], cell: int) -> Block:
+        """Of vehicles that all were told something in the cells from this one on."""
+        rows = [slice(cell - one.first, cell - one.first + BLOCK) for one in inputs]
+
+        def column(name: str) -> NDArray[Any]:
+            return np.array([getattr(one, name)[row] for one, row in zip(inputs, rows, strict=True)])
+
+        place, late = _told_first(column("place"), column("place_late_s"))
+        pictured, pictured_late = _told_first(column("pictured"), column("pictured_late_s"))
+        return cls(
+            column("rate_radps"),
+            column("force_mps2"),
+            column("unseen")[:, -1],
+            column("turned_radps"),
+            column("attitude")[:, -1],
+            _told_last(column("airspeed_mps")),
+            _told_last(column("altitude_m")),
+            place,
+            late,
+            pictured,
+            pictured_late,
+        )
+
+
+def _told_last(values: Floats) -> Floats:
+    """The last of each row's values (n, m) that is a number."""
+    known = ~np.isnan(values)
+    last = values.shape[1] - 1 - np.argmax(known[:, ::-1], axis=1)
+    return np.asarray(values[np.arange(len(values)), last])
+
+
+def _told_first(values: Floats, late_s: Floats) -> tuple[Floats, Floats]:
+    """The first of each row's values (n, m, k) that is told, and how long before the block's end that was, s (n,)."""
+    rows, first = np.arange(len(values)), np.argmax(~np.isnan(late_s), axis=1)
+    return values[rows, first], late_s[rows, first] + (BLOCK - 1 - first) * CELL_S

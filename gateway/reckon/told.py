@@ -100,23 +100,64 @@ def reads(observation: Observation) -> bool:
     return isinstance(observation, ImuSample | Attitude)
 
 
-def portioned(observations: Iterable[Observation], until: int) -> tuple[Portion, list[Observation]]:
-    """What observations received before a stamp tell; and those, or the parts of them, that came then or later."""
-    rows: defaultdict[tuple[str, int], list[tuple[int, tuple[float, ...]]]] = defaultdict(list)
-    parts: defaultdict[tuple[str, int], list[Series]] = defaultdict(list)
-    later: list[Observation] = []
+def before(observations: Iterable[Observation], until: int) -> tuple[list[Observation], list[Observation]]:
+    """Those observations, or the parts of them, that were received before a stamp; and those that came then or later."""
+    earlier, later = list[Observation](), list[Observation]()
     for one in observations:
         if isinstance(one, Many):
             is_now = one.columns["received_at"] < until
-            if not is_now.all():
-                later.append(Many(one.kind, {name: column[~is_now] for name, column in one.columns.items()}))
-                one = Many(one.kind, {name: column[is_now] for name, column in one.columns.items()})
+            if is_now.all():
+                earlier.append(one)
+            else:
+                earlier.append(_rows(one, is_now))
+                later.append(_rows(one, ~is_now))
+        else:
+            (earlier if one.received_at < until else later).append(one)
+    return earlier, later
+
+
+def tells_inertial(observations: Iterable[Observation]) -> set[str]:
+    """Who tells of an inertial unit."""
+    names = set[str]()
+    for one in observations:
+        if isinstance(one, Many):
+            if one.kind is ImuSample and one.columns.keys() >= _UNIT:
+                names.update(one.columns["aircraft"].tolist())
+        elif isinstance(one, ImuSample) and one.acceleration_mps2 is not None and one.angular_rate_radps is not None:
+            names.add(one.aircraft)
+    return names
+
+
+_UNIT = {"acceleration_mps2", "angular_rate_radps"}
+
+
+def by_share(observations: Iterable[Observation], shares: Mapping[str, int]) -> dict[int, list[Observation]]:
+    """What is told of the aircraft of each share, by its number; without what is told of others."""
+    found: defaultdict[int, list[Observation]] = defaultdict(list)
+    for one in observations:
+        if isinstance(one, Many):
+            numbers = [shares.get(name, -1) for name in one.columns["aircraft"].tolist()]
+            several = set(numbers)
+            for share in several - {-1}:
+                found[share].append(one if len(several) == 1 else _rows(one, np.array(numbers) == share))
+        elif isinstance(one, ImuSample | Attitude | AirData) and one.aircraft in shares:
+            found[shares[one.aircraft]].append(one)
+    return found
+
+
+def _rows(many: Many, which: NDArray[np.bool_]) -> Many:
+    return Many(many.kind, {name: column[which] for name, column in many.columns.items()})
+
+
+def portioned(observations: Iterable[Observation]) -> Portion:
+    """What observations tell, by aircraft."""
+    rows: defaultdict[tuple[str, int], list[tuple[int, tuple[float, ...]]]] = defaultdict(list)
+    parts: defaultdict[tuple[str, int], list[Series]] = defaultdict(list)
+    for one in observations:
+        if isinstance(one, Many):
             for key, series in _of_many(one):
                 parts[key].append(series)
         elif isinstance(one, ImuSample | Attitude | AirData):
-            if one.received_at >= until:
-                later.append(one)
-                continue
             for kind, values in _of_one(one):
                 rows[one.aircraft, kind].append((one.valid_at, values))
     for (aircraft, kind), told in rows.items():
@@ -127,7 +168,7 @@ def portioned(observations: Iterable[Observation], until: int) -> tuple[Portion,
         whole = Series.empty(WIDTHS[kind])
         at, joined = np.concatenate([one.at for one in several]), np.concatenate([one.values for one in several])
         portion[aircraft][kind] = whole.with_more(Series(at, joined))
-    return portion, later
+    return portion
 
 
 def _of_one(one: ImuSample | Attitude | AirData) -> Sequence[tuple[int, tuple[float, ...]]]:
@@ -160,7 +201,7 @@ def _of_many(many: Many) -> Iterable[tuple[tuple[str, int], Series]]:
     columns = many.columns
     wanted: list[tuple[int, Floats]] = []
     if many.kind is ImuSample:
-        if "acceleration_mps2" in columns and "angular_rate_radps" in columns:
+        if columns.keys() >= _UNIT:
             sensor = columns["sensor"].astype(np.float64)[:, None]
             wanted.append((INERTIAL, np.hstack([columns["acceleration_mps2"], columns["angular_rate_radps"], sensor])))
     else:

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from gateway.estimators.inertial import between, displaced
 from gateway.reckon.cells import CELL_NS, cells, covered_until
 from gateway.reckon.judging import WANDERS_M
-from gateway.reckon.running import Kinds, begun, run
+from gateway.reckon.running import begun, run
+from gateway.reckon.ties import Kinds
 from gateway.reckon.tip import NOTHING, Tip
 from gateway.reckon.told import PLACE, WIDTHS, Series, Told
 from gateway.settings import DeadReckoning

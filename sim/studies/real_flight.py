@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from gateway.estimators.inertial import Motion, between, displaced, from_angles
 from gateway.reckon.cells import CELL_NS, SECOND_CELLS, cells, covered_until
 from gateway.reckon.judging import WANDERS_M
-from gateway.reckon.reckoners import first_tip
-from gateway.reckon.running import Kinds, run
+from gateway.reckon.running import run
+from gateway.reckon.ties import Kinds
 from gateway.reckon.tip import Tip
 from gateway.reckon.told import PLACE, Series, Told
+from gateway.reckon.vehicle import first_tip
 from gateway.settings import DeadReckoning
 
 Floats = NDArray[np.float64]

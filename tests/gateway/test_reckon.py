@@ -17,7 +17,7 @@ from gateway.observation import Attitude, GpsReport, Heard, ImuSample, Many, Obs
 from gateway.picture import Picture
 from gateway.pipeline import State, initial, step
 from gateway.reckon.reckoners import Reckoners
-from gateway.reckon.told import Series, portioned
+from gateway.reckon.told import Series, before, portioned
 from gateway.settings import DeadReckoning, Options, RadarSite, Runway, Site
 from sim.inertial import aeroplane, car
 from sim.told_rides import Falsified, Teller, heard, honest
@@ -271,7 +271,8 @@ def test_what_was_received_at_an_instant_or_later_waits_for_the_next() -> None:
     _, said = told("car", honest, 40.0)
     samples = [each for one in said[:3] for each in one.observations if isinstance(each, Many)]
     until = int(samples[1].columns["received_at"][0])
-    portion, later = portioned(samples, until)
+    earlier, later = before(samples, until)
+    portion = portioned(earlier)
     assert len(portion["mavlink:1"][0].at) == 5
     assert sum(len(one) for one in later if isinstance(one, Many)) == 10
 
