@@ -16,6 +16,7 @@ from gateway.predict.gates import GateAlerts
 from gateway.settings import Site
 from gateway.sinks.scene import style
 from gateway.sinks.scene.entry import Always, Entry, entity, once
+from gateway.sinks.scene.mapped import label_look, lat_lon_deg
 
 Floats = NDArray[np.float64]
 
@@ -77,22 +78,14 @@ class BelievedScene:
             return
         if path not in self._shown:
             colour = style.CANDIDATE if path.endswith("candidates") else style.ALERT
-            yield Always(
-                path,
-                (
-                    rr.Points3D.from_fields(colors=colour, radii=style.points(3.0), show_labels=True),
-                    rr.GeoPoints.from_fields(colors=colour, radii=style.points(3.0)),
-                ),
-            )
+            yield Always(path, label_look(colour, 3.0))
         self._shown[path] = track
         places = np.nan_to_num(places)  # a point without a height stands on the runway's plane
-        latitude, longitude, _ = self._frame.geodetic_from_runway(places)
-        ground = np.degrees(np.stack([latitude, longitude], axis=-1))
         count = [len(labels)]
         yield once(
             path,
             at,
             step,
             rr.Points3D.columns(positions=places, labels=labels).partition(count),
-            rr.GeoPoints.columns(positions=ground).partition(count),
+            rr.GeoPoints.columns(positions=lat_lon_deg(self._frame, places)).partition(count),
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,11 +14,12 @@ from gateway.predict import Conflicts
 from gateway.settings import Site
 from gateway.sinks.scene import columns, style
 from gateway.sinks.scene.entry import Always, Entry, once
+from gateway.sinks.scene.mapped import circle, label_look, lat_lon_deg, line_look
 
 Floats = NDArray[np.float64]
 
 PATH = "/predict/conflicts"
-_CIRCLE = np.stack([f(np.linspace(0.0, 2.0 * math.pi, 49)) for f in (np.cos, np.sin)] + [np.zeros(49)], axis=-1)
+_CIRCLE = circle(48)
 
 
 class ConflictScene:
@@ -51,18 +51,7 @@ class ConflictScene:
         if self._looked:
             return []
         self._looked = True
-        thin, dot = style.points(1.5), style.points(4.0)
-        return [
-            Always(
-                PATH,
-                (
-                    rr.LineStrips3D.from_fields(colors=style.CONFLICT, radii=thin),
-                    rr.GeoLineStrings.from_fields(colors=style.CONFLICT, radii=thin),
-                    rr.Points3D.from_fields(colors=style.CONFLICT, radii=dot, show_labels=True),
-                    rr.GeoPoints.from_fields(colors=style.CONFLICT, radii=dot),
-                ),
-            )
-        ]
+        return [Always(PATH, (*line_look(style.CONFLICT, 1.5), *label_look(style.CONFLICT, 4.0)))]
 
     def _drawn(self, found: Conflicts, rows: list[int], at: int, step: int) -> list[Entry]:
         strips: list[Floats] = []
@@ -77,15 +66,11 @@ class ConflictScene:
                 at,
                 step,
                 columns.strips_3d(strips, [len(strips)]),
-                columns.strips_on_map([self._ground(strip) for strip in strips], [len(strips)]),
+                columns.strips_on_map([lat_lon_deg(self._frame, strip) for strip in strips], [len(strips)]),
                 dots.partition([len(rows)]),
-                rr.GeoPoints.columns(positions=self._ground(middle)).partition([len(rows)]),
+                rr.GeoPoints.columns(positions=lat_lon_deg(self._frame, middle)).partition([len(rows)]),
             )
         ]
-
-    def _ground(self, runway_m: Floats) -> Floats:
-        latitude, longitude, _ = self._frame.geodetic_from_runway(runway_m)
-        return np.degrees(np.stack([latitude, longitude], axis=-1))
 
     def _label(self, found: Conflicts, row: int, at: int) -> str:
         first, second = found.pair[row]

@@ -21,13 +21,14 @@ from gateway.sinks.scene import columns, style
 from gateway.sinks.scene.entry import Always, Entry, entity
 from gateway.sinks.scene.flown import Flock, Flown
 from gateway.sinks.scene.lately import Lately
+from gateway.sinks.scene.mapped import circle, lat_lon_deg, line_look
 from gateway.sinks.scene.sheaf import Sheaf
 
 Floats = NDArray[np.float64]
 
 DRAWN_EVERY_S = 5.0
 SHOWN, LEAST_SHOWN_M = 0.5, 50.0  # sigmas up to this share of the way, or so much, are drawn
-_CIRCLE = np.stack([f(np.linspace(0.0, 2.0 * math.pi, 25)) for f in (np.cos, np.sin)] + [np.zeros(25)], axis=-1)
+_CIRCLE = circle(24)
 
 
 class ApproachScene:
@@ -133,15 +134,11 @@ class PredictScene:
         strips = [strip for _, _, part in told for strip in part]
         counts = [len(part) for _, _, part in told]
         ends = np.cumsum([len(strip) for strip in strips])[:-1]
-        latitude, longitude, _ = self._frame.geodetic_from_runway(np.concatenate(strips))
-        ground = np.split(np.degrees(np.stack([latitude, longitude], axis=-1)), ends)
+        ground = np.split(lat_lon_deg(self._frame, np.concatenate(strips)), ends)
         entries: list[Entry] = []
-        radius, look = style.points(0.8), style.PREDICTED
         for track, mine in found.items():
             if self._looked.is_new(track, mine[-1][0]):
-                line = rr.LineStrips3D.from_fields(colors=look, radii=radius)
-                on_map = rr.GeoLineStrings.from_fields(colors=look, radii=radius)
-                entries.append(Always(entity("predict", track), (line, on_map)))
+                entries.append(Always(entity("predict", track), line_look(style.PREDICTED, 0.8)))
         time, step = [made for made, _, _ in told], [number for _, number, _ in told]
         sheaf = Sheaf.of(list(found), [len(mine) for mine in found.values()], time, step)
         drawn = columns.strips_3d(strips, counts), columns.strips_on_map(ground, counts)

@@ -17,6 +17,7 @@ from gateway.sinks.scene import columns, style
 from gateway.sinks.scene.entry import Always, Entry, entity, once
 from gateway.sinks.scene.flown import Flown
 from gateway.sinks.scene.lately import Lately
+from gateway.sinks.scene.mapped import label_look, line_look
 
 Floats = NDArray[np.float64]
 
@@ -104,18 +105,7 @@ class PlanScene:
     def _looks(self, path: str, colour: style.Colour, size: float, now: int) -> list[Entry]:
         if not self._looked.is_new(path, now):
             return []
-        thin = style.points(0.5)
-        return [
-            Always(
-                path,
-                (
-                    rr.Points3D.from_fields(colors=colour, radii=style.points(size), show_labels=True),
-                    rr.GeoPoints.from_fields(colors=colour, radii=style.points(size)),
-                    rr.LineStrips3D.from_fields(colors=colour, radii=thin),
-                    rr.GeoLineStrings.from_fields(colors=colour, radii=thin),
-                ),
-            )
-        ]
+        return [Always(path, (*label_look(colour, size), *line_look(colour, 0.5)))]
 
     def _next(self, told: _Told) -> PlanPoint | None:
         """The point that an intent names, by its place or by its number in the plan."""

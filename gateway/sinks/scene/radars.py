@@ -18,6 +18,7 @@ from gateway.picture import Picture
 from gateway.settings import Site
 from gateway.sinks.scene import columns, style
 from gateway.sinks.scene.entry import Always, Entry, entity, once
+from gateway.sinks.scene.mapped import lat_lon_deg
 from gateway.sinks.scene.sheaf import Sheaf
 from gateway.sinks.scene.trail import Trail, grown
 
@@ -43,8 +44,7 @@ class MultiRadarScene:
             for name in ("track", "time", "runway_m", "sigma_m")
         )
         step = np.repeat([step for _, step in parts], [len(one.time) for one, _ in parts])
-        latitude, longitude, _ = self._frame.geodetic_from_runway(place)
-        lat_lon = np.degrees(np.stack([latitude, longitude], axis=-1))
+        lat_lon = lat_lon_deg(self._frame, place)
         order = np.argsort(track, kind="stable")
         numbers, counts = np.unique(track, return_counts=True)
         sheaf = Sheaf.of(numbers.tolist(), counts, time[order], step[order])

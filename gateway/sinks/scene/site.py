@@ -7,12 +7,13 @@ from itertools import pairwise
 
 import numpy as np
 import rerun as rr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from gateway.frames import RunwayFrame
 from gateway.settings import RadarSite, Runway, Site
 from gateway.sinks.scene import style
 from gateway.sinks.scene.entry import Always, entity
+from gateway.sinks.scene.mapped import lat_lon_deg, weather_edge
 
 Floats = NDArray[np.float64]
 
@@ -70,7 +71,9 @@ class SiteScene:
             path,
             (
                 rr.LineStrips3D(strips, colors=colour, radii=radius),
-                rr.GeoLineStrings(lat_lon=[self._lat_lon(strip) for strip in strips], colors=colour, radii=radius),
+                rr.GeoLineStrings(
+                    lat_lon=[lat_lon_deg(self.frame, strip) for strip in strips], colors=colour, radii=radius
+                ),
             ),
         )
 
@@ -81,13 +84,9 @@ class SiteScene:
             path,
             (
                 rr.Points3D(place, labels=texts, show_labels=True, colors=colour, radii=radius),
-                rr.GeoPoints(lat_lon=self._lat_lon(place), colors=colour, radii=radius),
+                rr.GeoPoints(lat_lon=lat_lon_deg(self.frame, place), colors=colour, radii=radius),
             ),
         )
-
-    def _lat_lon(self, runway_m: ArrayLike) -> Floats:
-        latitude, longitude, _ = self.frame.geodetic_from_runway(np.asarray(runway_m, dtype=np.float64))
-        return np.degrees(np.stack([latitude, longitude], axis=-1))
 
     def _runway(self, runway: Runway) -> list[Always]:
         half, side = 0.5 * runway.length_m, 0.5 * runway.width_m
@@ -180,17 +179,7 @@ class SiteScene:
         return drawn
 
     def _weather(self) -> list[Always]:
-        drawn = []
-        height = self.site.runway.height_m
-        for area in self.site.weather:
-            if area.latitude_rad is not None and area.longitude_rad is not None and area.radius_m is not None:
-                centre = self.frame.runway_from_geodetic([area.latitude_rad], [area.longitude_rad], [height])[0]
-                angle = np.linspace(0.0, 2.0 * math.pi, 73)
-                circle = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=-1)
-                ring = centre * [1.0, 1.0, 0.0] + area.radius_m * circle
-            else:
-                latitude, longitude = np.array([*area.polygon_rad, area.polygon_rad[0]]).T
-                ring = self.frame.runway_from_geodetic(latitude, longitude, np.full(len(latitude), height))
-                ring[:, 2] = 0.0
-            drawn.append(self.lines(entity("site", "weather", area.name), [ring], style.JOINED, 1.0))
-        return drawn
+        return [
+            self.lines(entity("site", "weather", area.name), [weather_edge(self.frame, area)], style.JOINED, 1.0)
+            for area in self.site.weather
+        ]

@@ -17,6 +17,7 @@ from gateway.settings import Site
 from gateway.sinks.scene import columns, style
 from gateway.sinks.scene.entry import Always, Entry, entity
 from gateway.sinks.scene.lately import Lately
+from gateway.sinks.scene.mapped import lat_lon_deg
 from gateway.sinks.scene.sheaf import Sheaf
 from gateway.sinks.scene.trail import Kind, Trail, grown
 
@@ -105,8 +106,7 @@ class SourceScene:
         """The positions of sources, now and where they were; in the scene and on the map."""
         if not len(place):
             return []
-        latitude, longitude, _ = self._frame.geodetic_from_runway(place)
-        lat_lon = np.degrees(np.stack([latitude, longitude], axis=-1))
+        lat_lon = lat_lon_deg(self._frame, place)
         line = kind == "line"
         entries: list[Entry] = []
         extended = []
