@@ -1,6 +1,6 @@
 """What the conflict probe costs: a thousand aircraft on one level, each with its prediction, once a second, in CPU.
 
-python -m bench.probing ROUNDS       prints, as JSON, milliseconds of looking who comes near whom, and of watching these
+python -m bench.probing ROUNDS       prints, as JSON, milliseconds of looking who comes near whom, when, and of watching these
 
 They stand so close that some hundreds of pairs are in conflict: far more than ever will be.
 """
@@ -19,17 +19,18 @@ PART_MS = 10.0
 
 
 def probing(rounds: int) -> list[Figure]:
-    """The conflict probe of 1000 aircraft, 120 s ahead: its two parts, each of which holds up everything else."""
+    """The conflict probe of 1000 aircraft, 120 s ahead: its three parts, each of which holds up everything else."""
     told: dict[str, Any] = json.loads(alone([sys.executable, "-m", "bench.probing", str(rounds)]))
     name = f"conflict probe, {AIRCRAFT} aircraft, 120 s ahead, {told['conflicts']} conflicts"
     return [
         Figure(name, "ms", tuple(told["looking"]), PART_MS),
+        Figure("… when they meet", "ms", tuple(told["meeting"]), PART_MS),
         Figure("… watching these", "ms", tuple(told["watching"]), PART_MS),
     ]
 
 
 def measured_ms(rounds: int) -> dict[str, Any]:
-    """CPU of both parts of each round, and how many conflicts stood at the end."""
+    """CPU of the parts of each round, and how many conflicts stood at the end."""
     from bench.crowd import HEARD_S, STARTS, crowd
     from gateway import predict
     from gateway.align import SECOND
@@ -41,7 +42,7 @@ def measured_ms(rounds: int) -> dict[str, Any]:
     state = crowd(AIRCRAFT, options)
     model = Model.of(options, state.site.position, {}, state.site.estimation)
     numbers, predicting, probing = [lane.number for lane in state.lanes.lanes.values()], state.predicting, Probing()
-    found: dict[str, Any] = {"looking": [], "watching": []}
+    found: dict[str, Any] = {"looking": [], "meeting": [], "watching": []}
     for turn in range(rounds + 1):
         second = STARTS + (HEARD_S + 1 + turn) * SECOND
         planned = predicting.planning(list(state.lanes.lanes), second)
@@ -58,10 +59,13 @@ def measured_ms(rounds: int) -> dict[str, Any]:
         began = time.process_time()
         probing = probing.looking(second + SECOND, numbers, state.site.separation)
         looked = time.process_time()
+        probing = probing.meeting(state.site.separation)
+        met = time.process_time()
         probing, told = probing.watching(second + SECOND, numbers, state.site.separation)
         if turn:
             found["looking"].append(1e3 * (looked - began))
-            found["watching"].append(1e3 * (time.process_time() - looked))
+            found["meeting"].append(1e3 * (met - looked))
+            found["watching"].append(1e3 * (time.process_time() - met))
         found["conflicts"] = len(told.state)
     return found
 

@@ -29,6 +29,7 @@ class Turn(IntEnum):
     FORGETTING_MORE = 3
     REGISTERING = 5
     LOOKING = 9
+    MEETING = 10
     PROBING = 11
     LOOKING_AT_RADARS = 12
     COMPARING = 13
@@ -36,7 +37,7 @@ class Turn(IntEnum):
 
 
 TURN_NS = SECOND // 16
-READING_LANES = frozenset(Turn) - {Turn.REGISTERING, Turn.LOOKING_AT_RADARS, Turn.COMPARING}
+READING_LANES = frozenset(Turn) - {Turn.REGISTERING, Turn.MEETING, Turn.LOOKING_AT_RADARS, Turn.COMPARING}
 
 
 class Work(Associating):
@@ -96,6 +97,8 @@ class Work(Associating):
             self.consistency = self.consistency.planning(at)
         elif turn == Turn.LOOKING:
             self.probing = self.probing.looking(at, list(self._confirmed()), self.site.separation)
+        elif turn == Turn.MEETING:
+            self.probing = self.probing.meeting(self.site.separation)
         elif turn == Turn.PROBING:
             self._probe(at)
         elif turn == Turn.LOOKING_AT_RADARS:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND
 from gateway.frames import RunwayFrame, turn
-from gateway.predict.encounters import Encounters, encounters
+from gateway.predict.encounters import Encounters, Near, encounters, near_each_other
 from gateway.predict.ways import Ways
 from gateway.settings import Separation
 
@@ -72,13 +72,15 @@ class Round:
 class Probing:
     """What is remembered from round to round: the newest ways of all tracks, and the pairs that are watched.
 
-    A round is two things, so that a crowd holds nothing up for long: looking who comes near whom, and watching these.
+    A round is three things, so that a crowd holds nothing up for long: looking who comes near whom, when they meet, and
+    watching these.
     """
 
     ways: tuple[Ways, ...] = ()
     watched: Mapping[Pair, Watched] = field(default_factory=dict)
     last: Mapping[Pair, Met] = field(default_factory=dict)  # of those that are told, as they were told last
-    met: Encounters | None = None  # of the round that is under way
+    near: Near | None = None  # of the round that is under way
+    met: Encounters | None = None
 
     def hearing(self, ways: Ways, at: int, period_s: float) -> Probing:
         """The same with ways that were made at an instant; each track has new ones once in a period."""
@@ -88,8 +90,16 @@ class Probing:
     def looking(self, at: int, alive: Sequence[int], separation: Separation) -> Probing:
         """The same with who comes near whom, of the tracks with these numbers, as it is foretold at an instant."""
         if not alive:
-            return replace(self, ways=(), met=None)
-        return replace(self, met=self._met(at, alive, separation))
+            return replace(self, ways=(), near=None, met=None)
+        if not self.ways or len(alive) < 2:
+            return replace(self, near=None, met=None)
+        newest = Ways.joined(self.ways)
+        newest = newest.taken(np.isin(newest.track, np.array(alive, dtype=np.int64)))
+        return replace(self, near=near_each_other(newest, at, separation), met=None)
+
+    def meeting(self, separation: Separation) -> Probing:
+        """The same with when and how near they meet who were found near each other."""
+        return self if self.near is None else replace(self, near=None, met=encounters(self.near, separation))
 
     def watching(self, at: int, alive: Sequence[int], separation: Separation) -> tuple[Probing, Round]:
         """The round told at an instant, of the tracks with these numbers; what is remembered after it."""
@@ -114,15 +124,9 @@ class Probing:
             if now.since is not None:
                 last[pair] = self.last[pair] if row is None else (met, row)
                 told.append((last[pair], "found" if before.since is None else "goes on"))
-        return replace(self, watched=watched, last=last, met=None), Round(
+        return replace(self, watched=watched, last=last, near=None, met=None), Round(
             at, _of([one for one, _ in told]), tuple(state for _, state in told)
         )
-
-    def _met(self, at: int, alive: Sequence[int], separation: Separation) -> Encounters:
-        if not self.ways or len(alive) < 2:
-            return Encounters.joined([])
-        newest = Ways.joined(self.ways)
-        return encounters(newest.taken(np.isin(newest.track, np.array(alive, dtype=np.int64))), at, separation)
 
 
 def _of(some: Sequence[Met]) -> Encounters:

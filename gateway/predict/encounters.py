@@ -58,16 +58,32 @@ class Encounters:
         return cls(*(np.concatenate([getattr(part, one.name) for part in (none, *parts)]) for one in fields(cls)))
 
 
-def encounters(ways: Ways, at: int, separation: Separation) -> Encounters:
-    """The pairs that come nearer than 1.25 separations within the time that is looked ahead from an instant."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Near:
+    """Who of n tracks is near whom at some times of a grid, m of them, after an instant."""
+
+    ways: Ways
+    at: int  # ns
+    times_s: Floats  # (m,)
+    place: Floats  # (n, m, 3)
+    velocity: Floats  # (n, m, 3)
+    hits: tuple[Ints, Ints, Ints]  # as `neighbours` has them
+
+
+def near_each_other(ways: Ways, at: int, separation: Separation) -> Near:
+    """Who may come near whom within the time that is looked ahead from an instant: the first half of looking for encounters."""
     times_s = np.arange(0.0, separation.look_ahead_s + 1e-9, STEP_S)
     place = _level(at_instant(ways, at, times_s), ways.has_height, separation.least_height_m)
     velocity = _velocity(place)
     fastest = math.sqrt((velocity[..., 0] ** 2 + velocity[..., 1] ** 2).max(initial=0.0))
     reach_m = WIDER * separation.horizontal_m + STEP_S * min(fastest, FASTEST_MPS)
-    hits = neighbours(place[..., :2], reach_m)
-    met = _met(ways, place, velocity, times_s, hits, separation)
-    return _told(ways, at, met, place, velocity, times_s, separation)
+    return Near(ways, at, times_s, place, velocity, neighbours(place[..., :2], reach_m))
+
+
+def encounters(near: Near, separation: Separation) -> Encounters:
+    """The pairs that come nearer than 1.25 separations within the time that is looked ahead: the other half."""
+    met = _met(near.ways, near.place, near.velocity, near.times_s, near.hits, separation)
+    return _told(near.ways, near.at, met, near.place, near.velocity, near.times_s, separation)
 
 
 def _level(place: Floats, has_height: Bools, least_height_m: float) -> Floats:
@@ -104,12 +120,16 @@ def neighbours(place: Floats, reach_m: float) -> tuple[Ints, Ints, Ints]:
     own = bucket(cell_x, cell_y)
     order = np.argsort(own, kind="stable")
     starts = np.concatenate([[0], np.cumsum(np.bincount(own, minlength=_BUCKETS))])
+    behind = np.empty(len(order), dtype=np.int64)  # each one's place in the order, and one further
+    behind[order] = np.arange(1, len(order) + 1)
     found: list[tuple[Ints, Ints]] = []
     for step_x, step_y in _AROUND:
         there_too = bucket(cell_x + step_x, cell_y + step_y).astype(np.int64)
-        first, last = starts[there_too], starts[there_too + 1]
-        counts = last - first
-        one = np.repeat(np.arange(len(own)), counts)
+        first = behind if step_x == step_y == 0 else starts.take(there_too)
+        counts = starts.take(there_too + 1) - first
+        some = np.flatnonzero(counts)
+        first, counts = first.take(some), counts.take(some)
+        one = np.repeat(some, counts)
         other = order.take(np.arange(len(one)) + np.repeat(first - np.cumsum(counts) + counts, counts))
         d_east, d_north = east.take(other) - east.take(one), north.take(other) - north.take(one)
         close = np.flatnonzero(d_east * d_east + d_north * d_north < reach_m * reach_m)
@@ -118,8 +138,6 @@ def neighbours(place: Floats, reach_m: float) -> tuple[Ints, Ints, Ints]:
             cell_x[other] - cell_x[one] == step_x
         )  # cells that share a bucket are apart
         near &= cell_y[other] - cell_y[one] == step_y
-        if step_x == step_y == 0:
-            near &= row[one] < row[other]
         found.append((one[near], other[near]))
     one, other = (np.concatenate([part[side] for part in found]) for side in (0, 1))
     return np.minimum(row[one], row[other]), np.maximum(row[one], row[other]), time[one]
@@ -178,18 +196,15 @@ def _met(
 
 def _one_each(met: _Met, count: int) -> _Met:
     """The nearest instant of each pair of so many tracks, and when it first loses separation; only of pairs that come near."""
-    pair = met.first * count + met.second
-    order = np.lexsort(
-        (met.rank, pair)
-    )  # stable: of equal ones the earliest hit, which is the earliest time of two rows
-    pair = pair[order]
+    near = np.flatnonzero(met.ratio < WIDER)
+    pair = (met.first * count + met.second)[near]
+    order = np.lexsort((met.rank[near], pair))  # stable: of equal ones the earliest hit, which is the earliest time
+    near, pair = near[order], pair[order]
     begins = np.flatnonzero(np.append(True, pair[1:] != pair[:-1])[: len(order)])
-    loses_s = np.minimum.reduceat(met.loses_s[order], begins) if len(begins) else met.loses_s
-    one = order[begins]
-    near = met.ratio[one] < WIDER
-    one = one[near]
+    loses_s = np.minimum.reduceat(met.loses_s[near], begins) if len(begins) else np.zeros(0)
+    one = near[begins]
     return _Met(
-        met.first[one], met.second[one], met.grid[one], met.after_s[one], loses_s[near], met.ratio[one], met.rank[one]
+        met.first[one], met.second[one], met.grid[one], met.after_s[one], loses_s, met.ratio[one], met.rank[one]
     )
 
 

@@ -157,7 +157,8 @@ def at_instant(ways: Ways, at: int, times_s: Floats) -> Floats:
     grid = (((at - ways.made) / SECOND)[:, None] + times_s) / STEP_S
     first = np.clip(np.floor(grid), 0, last - 1).astype(np.int64)
     share = (grid - first)[..., None]
-    one, two = (np.take_along_axis(ways.place, place[..., None], axis=1) for place in (first, first + 1))
+    flat = first + np.arange(len(first))[:, None] * (last + 1)
+    one, two = (ways.place.reshape(-1, 3).take(place, axis=0) for place in (flat, flat + 1))
     beyond = (grid > last + 1e-9) | (grid < -1e-9)
     return np.where(beyond[..., None], np.nan, one * (1.0 - share) + two * share)
 

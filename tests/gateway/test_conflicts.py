@@ -15,7 +15,7 @@ from gateway.observation import FlightPlan, GpsReport, Heard, Intent, Observatio
 from gateway.picture import Picture
 from gateway.pipeline import initial, step
 from gateway.predict.conflicts import Probing
-from gateway.predict.encounters import encounters, neighbours
+from gateway.predict.encounters import encounters, near_each_other, neighbours
 from gateway.predict.ways import STEP_S, Ways, path_on
 from gateway.settings import DEMO_SITE, Options, Separation
 
@@ -41,9 +41,8 @@ def ways(places: Sequence[Sequence[float]], velocities: Sequence[Sequence[float]
 
 def test_a_crossing_is_found_with_its_time_its_place_and_how_near() -> None:
     """Two that meet at right angles in 80 s, 300 m and 50 m apart: that is what is told, and that it is all but sure."""
-    found = encounters(
-        ways([[0.0, 0.0, 1000.0], [8000.0, -8300.0, 1050.0]], [[100.0, 0, 0], [0, 100.0, 0]]), T0, Separation()
-    )
+    both = ways([[0.0, 0.0, 1000.0], [8000.0, -8300.0, 1050.0]], [[100.0, 0, 0], [0, 100.0, 0]])
+    found = encounters(near_each_other(both, T0, Separation()), Separation())
     assert found.pair.tolist() == [[1, 2]]
     assert (found.closest_at[0] - T0) / SECOND == pytest.approx(81.5, abs=0.1)
     assert found.horizontal_m[0] == pytest.approx(300.0 / math.sqrt(2.0), abs=5.0)
@@ -60,7 +59,8 @@ def test_a_crossing_is_found_with_its_time_its_place_and_how_near() -> None:
 )
 def test_levels_and_distances_keep_apart(height: float, aside: float, found: bool) -> None:
     """Head-on with 139 m between levels, or 1200 m to the side, is told; with 190 m, or 1600 m, it is not."""
-    met = encounters(ways([[0, 0, 1000.0], [10000.0, aside, height]], [[80.0, 0, 0], [-80.0, 0, 0]]), T0, Separation())
+    both = ways([[0, 0, 1000.0], [10000.0, aside, height]], [[80.0, 0, 0], [-80.0, 0, 0]])
+    met = encounters(near_each_other(both, T0, Separation()), Separation())
     assert (len(met.ratio) == 1) == found
 
 
@@ -69,7 +69,7 @@ def test_the_probability_is_the_share_of_draws_that_come_too_near() -> None:
     sigma, draws = 900.0, 4000
     one = ways([[0, 0, 1000.0], [10000.0, -9500.0, 1080.0]], [[90.0, 0, 0], [0, 90.0, 0]], sigma)
     one = replace(one, upright=np.full((2, ROWS), 60.0))
-    told = encounters(one, T0, Separation()).probability[0]
+    told = encounters(near_each_other(one, T0, Separation()), Separation()).probability[0]
     chance = np.random.default_rng(3)
     off = chance.normal(0.0, [sigma, sigma, 60.0], (draws, 2, 3))
     times = np.arange(0.0, 120.0, 0.25)
@@ -113,7 +113,7 @@ def test_a_conflict_is_told_after_three_rounds_and_over_after_five() -> None:
     plan = [toward] * 2 + [apart] + [toward] * 4 + [apart] * 4 + [toward] + [apart] * 6
     for count, now in enumerate(plan):
         probing = probing.hearing(now, T0 + count, 1e-9)
-        probing = probing.looking(T0, [1, 2], Separation())
+        probing = probing.looking(T0, [1, 2], Separation()).meeting(Separation())
         probing, found = probing.watching(T0, [1, 2], Separation())
         states.append(found.state)
     told = [one[0] if one else "" for one in states]

@@ -12,6 +12,7 @@ from gateway.observation import AirData, FlightPlan, GpsReport, Heard, Intent, O
 from gateway.picture import Picture
 from gateway.pipeline import initial, step
 from gateway.predict import TOGETHER, Predicting
+from gateway.predict.minds import UNKNOWN, Remembered
 from gateway.predict.predicting import FEW
 from gateway.predict.told import Tellings
 from gateway.settings import DEMO_SITE, Options, Site, Waypoint
@@ -258,3 +259,22 @@ def test_on_final_the_glide_path_leads_to_the_runway() -> None:
 def test_who_climbs_on_final_goes_around() -> None:
     """Climbing along the centreline, a go-around is what is inferred."""
     assert rows(on_final(3.0))[-1][2:4] == ("go-around", "inferred")
+
+
+def test_minds_are_those_of_their_tracks_however_parts_are_cut() -> None:
+    """Tracks come, end and move from part to part; each is given back what was thought of it, and a new one nothing."""
+    chance, known, remembered = np.random.default_rng(1), dict[int, float](), Remembered()
+    for turn in range(60):
+        tracks = chance.permutation(20)[: chance.integers(1, 20)].tolist()
+        for part in (tracks[:6], tracks[6:]) if turn % 3 else (sorted(tracks),):
+            if part:
+                minds = remembered.of(part)
+                assert minds.speed.tolist() == [known.get(track, 0.0) for track in part]
+                assert (minds.at == UNKNOWN).tolist() == [track not in known for track in part]
+                speed = chance.uniform(1.0, 99.0, len(part))
+                remembered = remembered.after(part, replace(minds, at=np.full(len(part), turn), speed=speed))
+                known |= dict(zip(part, speed.tolist(), strict=True))
+        if turn % 7 == 6:
+            known = {track: speed for track, speed in known.items() if track % 5}
+            remembered = remembered.without(dict.fromkeys(known))
+    assert sorted(track for part, _ in remembered.parts for track in part) == sorted(known)
