@@ -21,7 +21,7 @@ from typing import Any
 
 from gateway.observation import Intent, WeatherArea
 from gateway.settings import Weather
-from gateway.settings.declared import instant_ns
+from gateway.settings.instants import instant_ns
 
 DECLARED = "declared"
 LONGEST_LINE = 100_000

@@ -18,7 +18,7 @@ from gateway.predict.goals import AROUND, LEGS, Goals
 from gateway.predict.states import State
 from gateway.predict.told import Tellings
 from gateway.settings import Site, Weather
-from gateway.settings.declared import instant_ns
+from gateway.settings.instants import instant_ns
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -20,11 +20,21 @@ from gateway.settings.site import (
     Waypoint,
     Weather,
 )
-from gateway.settings.tables import TABLES
+from gateway.settings.tables import TABLES, Table
 
 
 class SiteError(ValueError):
     """A site file that cannot be used; the message is one plain sentence for the person who wrote it."""
+
+
+def read_toml(text: str, name: str) -> dict[str, Any]:
+    """The document that a TOML text is. Raises SiteError."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SiteError(f"{name}: not TOML: {error}.") from error
+    except (ValueError, RecursionError) as error:  # thousands of digits, or of brackets
+        raise SiteError(f"{name}: not TOML that anybody would write: {error}.") from error
 
 
 def parse_site(text: str, name: str = "site file") -> Site:
@@ -32,12 +42,7 @@ def parse_site(text: str, name: str = "site file") -> Site:
 
     Raises SiteError: one sentence with the file's name and the line.
     """
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SiteError(f"{name}: not TOML: {error}.") from error
-    except (ValueError, RecursionError) as error:  # thousands of digits, or of brackets
-        raise SiteError(f"{name}: not TOML that anybody would write: {error}.") from error
+    document = read_toml(text, name)
     for key in document:
         if key != "name" and key not in TABLES:
             raise SiteError(
@@ -50,7 +55,7 @@ def parse_site(text: str, name: str = "site file") -> Site:
         raise SiteError(f"{name}: the table [runway] is missing; it needs {', '.join(TABLES['runway'].required)}.")
 
     def rows(table: str) -> list[dict[str, Any]]:
-        return _read_table(document, table, text, name)
+        return read_table(document, table, TABLES[table], text, name)
 
     runway = Runway(**rows("runway")[0])
     against = runway.landing_compass_rad + math.pi
@@ -77,7 +82,7 @@ def parse_site(text: str, name: str = "site file") -> Site:
 
 def read_weather(document: Mapping[str, Any], text: str, name: str) -> tuple[Weather, ...]:
     """The areas of a document that was read from a text. Raises SiteError."""
-    return tuple(_weather(row, name) for row in _read_table(document, "weather", text, name))
+    return tuple(_weather(row, name) for row in read_table(document, "weather", TABLES["weather"], text, name))
 
 
 def _weather(row: dict[str, Any], name: str) -> Weather:
@@ -89,9 +94,9 @@ def _weather(row: dict[str, Any], name: str) -> Weather:
     return Weather(**row)
 
 
-def _read_table(document: Mapping[str, Any], table: str, text: str, name: str) -> list[dict[str, Any]]:
-    """Every occurrence of one table with its keys checked and converted to the dataclass's fields."""
-    shape, label = TABLES[table], f"[[{table}]]" if TABLES[table].many else f"[{table}]"
+def read_table(document: Mapping[str, Any], table: str, shape: Table, text: str, name: str) -> list[dict[str, Any]]:
+    """Every occurrence of one table with its keys checked and converted to the dataclass's fields. Raises SiteError."""
+    label = f"[[{table}]]" if shape.many else f"[{table}]"
     content = document.get(table, [] if shape.many else None)
     if content is None:
         return []

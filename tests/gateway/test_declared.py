@@ -19,7 +19,8 @@ from gateway.pipeline import initial, step
 from gateway.predict.told import Tellings, known_points
 from gateway.predict.weather import crosses, hull
 from gateway.settings import DEMO_SITE, Options, Site, SiteError, Waypoint, Weather
-from gateway.settings.declared import instant_ns, parse_declared
+from gateway.settings.declared import parse_declared
+from gateway.settings.instants import instant_ns
 
 SECOND = 1_000_000_000
 T0 = 1_790_000_000 * SECOND
@@ -218,7 +219,9 @@ def test_no_bytes_raise(line: bytes) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("[[declared]]\nto = 'IAF'\n", "lacks an aircraft"),
+        ("[[declared]]\nto = 'IAF'\n", "line 1: .* lacks aircraft"),
+        ("[[declared]]\naircraft = 'a'\nto = true\n", "line 3: to must be a name in quotes or an item's number"),
+        ("[[declared]]\naircraft = 'a'\nlatitude_deg = 95\n", "line 3: latitude_deg must be between -90 and 90"),
         ("[[declared]]\naircraft = 'mavlink:1'\n", "needs either"),
         ("[[declared]]\naircraft = 'a'\nto = 'X'\n[[declared]]\naircraft = 'a'\nto = 'Y'\n", "declared twice"),
         ("[[declared]]\naircraft = 'a'\nwhere = 'X'\n", "unknown key 'where'"),

@@ -340,3 +340,12 @@ def test_an_acceleration_in_another_unit_is_asked_for_in_metres() -> None:
     text = format_site(DEMO_SITE).replace("[estimation]", "[estimation]\ncalm_acceleration_g = 0.1")
     with pytest.raises(SiteError, match="calm_acceleration_mps2 here"):
         parse_site(text)
+
+
+@pytest.mark.parametrize("until", ["2026-13-01T12:00:00Z", "2026-03-01T25:00:00Z", "tomorrow"])
+def test_weather_ends_at_a_time_that_there_is(until: str) -> None:
+    """A thirteenth month is no time: taken for one, the area would hold for ever."""
+    circle = "latitude_deg = 31.0\nlongitude_deg = 104.0\nradius_m = 5000.0\n"
+    with pytest.raises(SiteError, match="until must be a time such as") as caught:
+        parse_site(LEAST + f'[[weather]]\nname = "storm"\nuntil = "{until}"\n' + circle, "field.toml")
+    _is_one_sentence(str(caught.value))
