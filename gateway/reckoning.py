@@ -23,7 +23,7 @@ class Reckoning(Fusing):
     """A step that knows where vehicles are that tell how they move."""
 
     def _reckon(self, at: int) -> None:
-        """At a whole second: all vehicles go on; of many the first ones, the others later in the second."""
+        """At a whole second: all vehicles go on; many do so in shares, later in the second."""
         if self.options.dead_reckoning == "off" or self.reckoners.is_idle:
             return
         self.reckoners = self.reckoners.planning(at)

@@ -1,8 +1,8 @@
 """The dead reckoning of all vehicles: what each has told lately, and how far its filters have come. One immutable value.
 
 It moves on at whole seconds of the session's time, with everything that was heard before, so that it does not matter how
-arrivals fall together. Of many vehicles only the first share does so at the second itself: the others follow within it, each
-at its own instant, and are then where they would have been at the second.
+arrivals fall together. Many vehicles do not do so at once: shares of them follow within the second, each at its own instant,
+and are then where they would have been at the second itself.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from gateway.settings import DeadReckoning
 VEHICLES_AT_MOST = 200
 TYPES_AT_MOST = 10_000  # a bound on what strangers can make us remember
 AHEAD_NS = 3 * SECOND  # a state is carried on so far at most
-TOGETHER = 8  # vehicles of a share: fewer at once cost more each, more hold up what comes
+TOGETHER = 6  # vehicles of a share: fewer at once cost more each, more hold up what comes
 NOTHING_DUE = 1 << 62
 
 Waiting = tuple[int, tuple[Observation, ...]]
@@ -113,8 +113,8 @@ class Reckoners:
         return NOTHING if reckoner is None or reckoner.tip is None else int(reckoner.tip.denied[0])
 
     def planning(self, at: int) -> Reckoners:
-        """At a whole second, the same with all vehicles in shares, each with what was received before: the first is due now,
-        the others follow, evenly over the second. What was planned before must have been done.
+        """At a whole second, the same with all vehicles in shares, each with what was received before: a single one is due
+        now, of several each in the middle of its part of the second. What was planned before must have been done.
         """
         told, later = list[Observation](), list[Waiting]()
         for added, observations in self.waiting:
@@ -124,7 +124,8 @@ class Reckoners:
                 later.append((added, tuple(rest)))
         new = sorted(tells_inertial(told) - {*self.by_aircraft})
         room = max(VEHICLES_AT_MOST - len(self.by_aircraft), 0)
-        names = (*self.by_aircraft, *new[:room])
+        known = {**self.by_aircraft, **{name: Reckoner() for name in new[:room]}}
+        names = tuple(known)
         parts = [names[first : first + TOGETHER] for first in range(0, len(names), TOGETHER)]
         number = {name: place for place, part in enumerate(parts) for name in part}
         theirs = by_share(told, number)
@@ -137,9 +138,10 @@ class Reckoners:
             )
             for place, part in enumerate(parts)
         )
-        planned = tuple((at + place * SECOND // len(parts), share) for place, share in enumerate(shares))
+        middles = (at + (2 * place + 1) * SECOND // (2 * len(parts)) for place in range(len(parts)))
+        planned = tuple(zip(middles if len(parts) > 1 else (at,), shares, strict=False))
         crowded = self.crowded or len(new) > room
-        return replace(self, waiting=tuple(later), places=(), planned=planned, crowded=crowded)
+        return replace(self, by_aircraft=known, waiting=tuple(later), places=(), planned=planned, crowded=crowded)
 
     def advanced(self, history_ns: int, settings: DeadReckoning) -> Reckoners:
         """The same with the share that is due as far as what it was told reaches, its position sources judged."""
@@ -148,7 +150,7 @@ class Reckoners:
         changed: dict[str, Reckoner] = {}
         running: list[tuple[str, Reckoner, Cells]] = []
         for aircraft in share.names:
-            was = self.by_aircraft.get(aircraft) or Reckoner()
+            was = self.by_aircraft[aircraft]
             told, since = with_portion(was.told, portion.get(aircraft, {}))
             if aircraft in by_place:
                 more = by_place[aircraft]
@@ -160,7 +162,8 @@ class Reckoners:
                 running.append((aircraft, reckoner, cells(told, int(reckoner.tip.cell[0]), end)))
         changed |= self._run(running, settings)
         kept = {aircraft: pruned(one, share.at - history_ns, settings) for aircraft, one in changed.items()}
-        alive = {name: one for name, one in {**self.by_aircraft, **kept}.items() if len(one.told.series[INERTIAL].at)}
+        gone = {aircraft for aircraft, one in kept.items() if not len(one.told.series[INERTIAL].at)}
+        alive = {name: one for name, one in {**self.by_aircraft, **kept}.items() if name not in gone}
         return replace(self, by_aircraft=alive, planned=tuple(planned))
 
     def _run(self, running: Sequence[tuple[str, Reckoner, Cells]], settings: DeadReckoning) -> dict[str, Reckoner]:

@@ -129,6 +129,7 @@ def tells_inertial(observations: Iterable[Observation]) -> set[str]:
 
 
 _UNIT = {"acceleration_mps2", "angular_rate_radps"}
+_READ = _UNIT | {"aircraft", "valid_at", "sensor", "airspeed_mps", "altitude_msl_m"}
 
 
 def by_share(observations: Iterable[Observation], shares: Mapping[str, int]) -> dict[int, list[Observation]]:
@@ -153,20 +154,24 @@ def portioned(observations: Iterable[Observation]) -> Portion:
     """What observations tell, by aircraft."""
     rows: defaultdict[tuple[str, int], list[tuple[int, tuple[float, ...]]]] = defaultdict(list)
     parts: defaultdict[tuple[str, int], list[Series]] = defaultdict(list)
+    manys: defaultdict[tuple[type, frozenset[str]], list[Many]] = defaultdict(list)
     for one in observations:
         if isinstance(one, Many):
-            for key, series in _of_many(one):
-                parts[key].append(series)
+            manys[one.kind, frozenset(one.columns)].append(one)
         elif isinstance(one, ImuSample | Attitude | AirData):
             for kind, values in _of_one(one):
                 rows[one.aircraft, kind].append((one.valid_at, values))
+    for (of, names), several in manys.items():
+        columns = {name: np.concatenate([one.columns[name] for one in several]) for name in names & _READ}
+        for key, series in _of_many(Many(of, columns)):
+            parts[key].append(series)
     for (aircraft, kind), told in rows.items():
         when = np.array([at for at, _ in told], np.int64)
         parts[aircraft, kind].append(Series(when, np.array([values for _, values in told], np.float64)))
     portion: defaultdict[str, dict[int, Series]] = defaultdict(dict)
-    for (aircraft, kind), several in parts.items():
+    for (aircraft, kind), pieces in parts.items():
         whole = Series.empty(WIDTHS[kind])
-        at, joined = np.concatenate([one.at for one in several]), np.concatenate([one.values for one in several])
+        at, joined = np.concatenate([one.at for one in pieces]), np.concatenate([one.values for one in pieces])
         portion[aircraft][kind] = whole.with_more(Series(at, joined))
     return portion
 

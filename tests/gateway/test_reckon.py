@@ -16,8 +16,9 @@ from gateway.frames import RadarFrame, RunwayFrame, polar_from_xyz
 from gateway.observation import Attitude, GpsReport, Heard, ImuSample, Many, Observation, RadarPlot
 from gateway.picture import Picture
 from gateway.pipeline import State, initial, step
-from gateway.reckon.reckoners import Reckoners
-from gateway.reckon.told import Series, before, portioned
+from gateway.reckon import reckoners as many
+from gateway.reckon.reckoners import TOGETHER, Reckoners
+from gateway.reckon.told import Series, before, by_share, portioned
 from gateway.settings import DeadReckoning, Options, RadarSite, Runway, Site
 from sim.inertial import aeroplane, car
 from sim.told_rides import Falsified, Teller, heard, honest
@@ -25,7 +26,8 @@ from sim.told_rides import Falsified, Teller, heard, honest
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND
 SITE = Site("here", Runway(math.radians(47.4), math.radians(8.5), 500.0, 0.0, geoid_separation_m=0.0))
-FALSE_FROM_S = 45.0
+FALSE_FROM_S = 36.0
+QUIET = Options(horizons_s=(10.0,), prediction_period_s=60.0)  # nothing here is about predictions
 
 
 def walks_off(time_s: float) -> tuple[float, float, float, float]:
@@ -51,7 +53,7 @@ def goes_away(time_s: float) -> tuple[float, float, float, float] | None:
 
 
 @cache
-def told(kind: str, falsified: Falsified, length_s: float = 75.0) -> tuple[Teller, tuple[Heard, ...]]:
+def told(kind: str, falsified: Falsified, length_s: float = 66.0) -> tuple[Teller, tuple[Heard, ...]]:
     generator = np.random.default_rng([7, kind == "car"])
     make, vehicle_type = (car, 10) if kind == "car" else (aeroplane, 1)
     teller = Teller.of("mavlink:1", vehicle_type, make(generator, length_s), generator, falsified)
@@ -59,7 +61,7 @@ def told(kind: str, falsified: Falsified, length_s: float = 75.0) -> tuple[Telle
 
 
 def pictures(
-    said: Iterable[Heard], at_once: int = 10, options: Options = Options(), site: Site = SITE
+    said: Iterable[Heard], at_once: int = 10, options: Options = QUIET, site: Site = SITE
 ) -> Iterator[tuple[State, Picture]]:
     state, waiting = initial(site, options), list[Heard]()
     for one in said:
@@ -73,7 +75,7 @@ def pictures(
 @cache
 def ran(kind: str, falsified: Falsified, dead_reckoning: Literal["on", "off"] = "on") -> tuple[Picture, ...]:
     """A ride, seen through to its end."""
-    options = Options(dead_reckoning=dead_reckoning, horizons_s=(10.0,))
+    options = replace(QUIET, dead_reckoning=dead_reckoning)
     return tuple(picture for _, picture in pictures(told(kind, falsified)[1], options=options))
 
 
@@ -159,7 +161,7 @@ def plots(teller: Teller, radar: RadarSite) -> Iterator[Heard]:
     frame, motion = RunwayFrame(SITE.runway), teller.ride.motion
     seen = RadarFrame.of(radar, frame)
     generator = np.random.default_rng(3)
-    for second in range(1, 75):
+    for second in range(1, 66):
         at, place = START + second * SECOND, second * 50
         there = motion.latitude_rad[place], motion.longitude_rad[place], motion.height_m[place]
         polar = polar_from_xyz(seen.from_enu(frame.enu_from_geodetic(*there)))
@@ -214,8 +216,8 @@ def split(said: Iterable[Heard]) -> Iterator[Heard]:
 
 
 def test_how_arrivals_fall_into_steps_changes_no_bit() -> None:
-    said = tuple(one for one in told("aeroplane", goes_away)[1] if one.now < START + 50 * SECOND)
-    end = Heard(START + 51 * SECOND)
+    said = tuple(one for one in told("aeroplane", goes_away)[1] if one.now < START + 41 * SECOND)
+    end = Heard(START + 42 * SECOND)
 
     def rows(some: Iterable[Heard], at_once: int) -> bytes:
         made = [picture.fuse for _, picture in pictures(some, at_once)]
@@ -228,13 +230,69 @@ def test_how_arrivals_fall_into_steps_changes_no_bit() -> None:
 _COLUMNS = ("time", "latitude_rad", "longitude_rad", "height_m", "velocity_mps", "covariance", "wind_mps")
 
 
+CROWD = TOGETHER + 3
+
+
+@cache
+def crowd_told() -> tuple[Heard, ...]:
+    """Twelve seconds of more vehicles than a share has; for the last six without positions."""
+    tellers = []
+    for number in range(CROWD):
+        generator = np.random.default_rng([11, number])
+        falsified = lambda time_s: None if time_s > 6.0 else (0.0, 0.0, 0.0, 0.0)  # noqa: E731
+        tellers.append(Teller.of(f"mavlink:{number + 1}", 1, aeroplane(generator, 12.0), generator, falsified))
+    return tuple(heard(tellers, START, 5))
+
+
+def crowd_rows(at_once: int) -> list[tuple[int, str | None, str, bytes]]:
+    """What is written of a crowd, in order of time: when, of whom, by what, and the bits of where."""
+    said = [*crowd_told(), Heard(START + 14 * SECOND - 1)]
+    found = []
+    for picture in (one for _, one in pictures([*said, *said[-1:] * (-len(said) % at_once)], at_once)):
+        fuse = picture.fuse
+        for row, at in enumerate(fuse.time.tolist()):
+            bits = fuse.latitude_rad[row].tobytes() + fuse.velocity_mps[row].tobytes() + fuse.covariance[row].tobytes()
+            found.append((at, fuse.aircraft[row], fuse.updated_by[row], bits))
+    return sorted(found)
+
+
+def test_a_crowd_goes_on_in_shares_within_the_second_and_is_where_it_would_be_if_all_did_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    in_shares, at_once = crowd_rows(10), crowd_rows(200)
+    assert in_shares == at_once
+    led = [row for row in in_shares if row[2] == "dead-reckoning"]
+    assert len(led) >= 2 * CROWD
+    assert not [row for row in in_shares if row[2] == "coast"]
+    monkeypatch.setattr(many, "TOGETHER", CROWD)
+    assert [row for row in crowd_rows(200) if row[2] == "dead-reckoning"] == led
+
+
+def test_a_crowd_is_planned_in_shares_of_a_few_evenly_over_the_second_and_a_few_vehicles_at_once() -> None:
+    samples = [each for each in crowd_told()[0].observations if isinstance(each, Many)]
+    planned = Reckoners().hearing(0, samples).planning(START + SECOND).planned
+    assert [at - START - SECOND for at, _ in planned] == [SECOND // 4, 3 * SECOND // 4]
+    assert [len(share.names) for _, share in planned] == [TOGETHER, CROWD - TOGETHER]
+    assert [len(share.told) for _, share in planned] == [TOGETHER, CROWD - TOGETHER]
+    few = Reckoners().hearing(0, samples[:TOGETHER]).planning(START + SECOND).planned
+    assert [(at, len(share.names)) for at, share in few] == [(START + SECOND, TOGETHER)]
+
+
+def test_columns_of_several_vehicles_are_parted_among_their_shares() -> None:
+    one, other = (each for each in crowd_told()[0].observations[:8] if isinstance(each, Many))
+    both = Many(ImuSample, {name: np.concatenate([one.columns[name], other.columns[name]]) for name in one.columns})
+    shares = by_share([both], {"mavlink:1": 0, "mavlink:2": 1})
+    assert [[len(each) for each in shares[number]] for number in (0, 1)] == [[len(one)], [len(other)]]
+    assert portioned(shares[1])["mavlink:2"][0].values.tolist() == portioned([other])["mavlink:2"][0].values.tolist()
+
+
 def test_what_is_told_late_goes_back_to_its_place() -> None:
     """Two seconds of inertial samples that come 1.5 s late leave the same state as samples that came in time."""
-    _, said = told("car", honest, 40.0)
+    _, said = told("car", honest, 14.0)
     late = []
     for one in said:
         samples = tuple(each for each in one.observations if isinstance(each, Many))
-        if START + 30 * SECOND < one.now < START + 32 * SECOND:
+        if START + 8 * SECOND < one.now < START + 10 * SECOND:
             others = tuple(each for each in one.observations if not isinstance(each, Many))
             late.append((one.now, replace(one, observations=others)))
             later = one.now + 1_500_000_000
@@ -248,7 +306,7 @@ def test_what_is_told_late_goes_back_to_its_place() -> None:
     late.sort(key=lambda pair: pair[0])
     *_, (in_time, _) = pictures(said, len(said))
     *_, (behind, _) = pictures([one for _, one in late], len(late))
-    a, b = (state.reckoners.of("mavlink:1", START + 39 * SECOND) for state in (in_time, behind))
+    a, b = (state.reckoners.of("mavlink:1", START + 13 * SECOND) for state in (in_time, behind))
     assert a is not None
     assert b is not None
     assert a.latitude_rad == pytest.approx(b.latitude_rad, abs=1e-14)
@@ -268,7 +326,7 @@ def test_series_are_the_same_whatever_came_first() -> None:
 
 
 def test_what_was_received_at_an_instant_or_later_waits_for_the_next() -> None:
-    _, said = told("car", honest, 40.0)
+    _, said = told("car", honest, 14.0)
     samples = [each for one in said[:3] for each in one.observations if isinstance(each, Many)]
     until = int(samples[1].columns["received_at"][0])
     earlier, later = before(samples, until)
@@ -322,5 +380,5 @@ def test_a_unit_that_tells_nonsense_stops_nothing(wild: float) -> None:
 
 def test_a_site_may_let_everything_pass() -> None:
     site = replace(SITE, dead_reckoning=DeadReckoning(refuses=False))
-    *_, (state, _) = pictures(told("aeroplane", jumps)[1][:480], site=site)
+    *_, (state, _) = pictures(told("aeroplane", jumps)[1][:400], site=site)
     assert "GPS reports that inertial data deny" not in state.counters
