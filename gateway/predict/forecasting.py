@@ -20,6 +20,7 @@ from gateway.predict.choosing import Chosen, chosen
 from gateway.predict.gates import Gates, Judged
 from gateway.predict.heights import heights
 from gateway.predict.hindsight import MOVING_MPS, kept, learnt, scaled
+from gateway.predict.minds import Minds
 from gateway.predict.predicting import Predicting
 from gateway.predict.spread import (
     ALONG_POINTS,
@@ -27,13 +28,14 @@ from gateway.predict.spread import (
     ENDS_LANDED,
     ENDS_ROUND,
     ROUND_A_POINT,
+    Spread,
     beside,
     spread,
     wind_sigma,
 )
 from gateway.predict.states import State
 from gateway.predict.table import Forecast
-from gateway.predict.thinking import TURNS_RAD, motions
+from gateway.predict.thinking import TURNS_RAD, Motions, motions
 from gateway.predict.ways import ways_of
 from gateway.settings import Site
 
@@ -75,30 +77,13 @@ def forecast(
     )
     way, minds = chosen(before, minds, at, now, stacked, state.climb, site)
     horizons = state.since_s[:, None] + np.array(horizons_s)
-    start = two_segment.Moving(state.at_position, state.velocity, np.where(way.circles, way.rate, now.turn_rate))
     around = beside(horizons)
-    braking = np.where(way.lands.any(axis=1), LANDED_MPS2, np.where(way.ends_round, ROUND_MPS2, 0.0))
-    whole = two_segment.ahead(
-        start,
-        way.route,
-        around,
-        now.turning,
-        wind=winds,
-        air_speed=now.cruise,
-        slower=np.where(way.lands, APPROACH, 1.0),
-        lead_m=LEAD_S * np.maximum(state.speed, 1.0),
-        braking=braking,
-        circles=way.rounds if np.isfinite(way.rounds.radius).any() else None,
-    )
+    whole = _paths(now, way, state, winds, around)
     ahead, by_points = whole.first(horizons.shape[1]), whole.follows | way.circles
     unscaled = spread(
         now, whole, horizons, state.place_sigma, _rests(way, whole), way.confidence, wind_sigma(now, winds)
     )
-    minds = learnt(minds, at, state, horizons_s)
-    turns = (ahead.turned > TURNS_RAD) | (now.unsettled > TURNS_RAD)[:, None]
-    sigma = scaled(minds, unscaled, turns)
-    moves = now.speed >= MOVING_MPS
-    minds = kept(minds, at, horizons_s, ahead.position, ahead.course, unscaled, turns, moves)
+    sigma, minds = _in_hindsight(minds, at, horizons_s, state, now, ahead, unscaled)
     up = heights(state.up, state.climb, now, ahead, way.up, way.lands, way.route, horizons)
     mean = np.concatenate([ahead.position, up[..., None]], axis=2)
     known_s, reported = around - state.since_s[:, None], np.array([lane.aircraft is not None for lane in lanes])
@@ -123,6 +108,39 @@ def forecast(
         weighed(at, numbers, goals, way.share),
     )
     return replace(predicting, remembered=predicting.remembered.after(tracks, minds), gates=gates), made
+
+
+def _paths(now: Motions, way: Chosen, state: State, winds: Floats, horizons: Floats) -> two_segment.Ahead:
+    """The paths of n aircraft on their ways at horizons (n, h), in winds (n, 2)."""
+    start = two_segment.Moving(state.at_position, state.velocity, np.where(way.circles, way.rate, now.turn_rate))
+    return two_segment.ahead(
+        start,
+        way.route,
+        horizons,
+        now.turning,
+        wind=winds,
+        air_speed=now.cruise,
+        slower=np.where(way.lands, APPROACH, 1.0),
+        lead_m=LEAD_S * np.maximum(state.speed, 1.0),
+        braking=np.where(way.lands.any(axis=1), LANDED_MPS2, np.where(way.ends_round, ROUND_MPS2, 0.0)),
+        circles=way.rounds if np.isfinite(way.rounds.radius).any() else None,
+    )
+
+
+def _in_hindsight(
+    minds: Minds,
+    at: int,
+    horizons_s: tuple[float, ...],
+    state: State,
+    now: Motions,
+    ahead: two_segment.Ahead,
+    unscaled: Spread,
+) -> tuple[Spread, Minds]:
+    """The sigmas scaled by what became of earlier predictions, and these predictions kept until they come due."""
+    minds = learnt(minds, at, state, horizons_s)
+    turns = (ahead.turned > TURNS_RAD) | (now.unsettled > TURNS_RAD)[:, None]
+    sigma, moves = scaled(minds, unscaled, turns), now.speed >= MOVING_MPS
+    return sigma, kept(minds, at, horizons_s, ahead.position, ahead.course, unscaled, turns, moves)
 
 
 def _on_final(

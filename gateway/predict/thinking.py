@@ -80,25 +80,19 @@ def motions(
     course = np.arctan2(velocity[:, 1], velocity[:, 0])
     elapsed_s = np.where(before.at == UNKNOWN, math.inf, (at - before.at) / SECOND)
     fresh = (elapsed_s > STALE_S) | (elapsed_s <= 0.0)
-    older = np.where(np.isnan(before.courses[:, 1]), before.courses[:, 0], before.courses[:, 1])
+    course_sigma = velocity_sigma / np.maximum(speed, LEAST_SPEED_MPS)
     span_s = np.where(np.isnan(before.courses[:, 1]), elapsed_s, elapsed_s + before.interval_s)
+    older = np.where(np.isnan(before.courses[:, 1]), before.courses[:, 0], before.courses[:, 1])
     measured = np.where(fresh, 0.0, wrap_rad(course - older) / np.where(fresh, 1.0, span_s))
     measured = np.where(speed < LEAST_SPEED_MPS, 0.0, measured)
     sigma = math.sqrt(2.0) * velocity_sigma / np.maximum(speed, LEAST_SPEED_MPS) / np.where(fresh, 1.0, span_s)
-    by_modes = np.where(np.isnan(sides[:, 0]), 0, np.array([0, 1, -1])[or_zero(sides).argmax(axis=1)])
-    by_modes = np.where(or_zero(sides).max(axis=1) > intent.TURN_SURE, by_modes, 0)
-    by_course = np.where(np.abs(measured) > np.maximum(SURE_SIGMAS * sigma, LEAST_RATE_RPS), np.sign(measured), 0.0)
-    side = np.where(np.isnan(sides[:, 0]), by_course, by_modes).astype(np.int64)
-    usual_sigma = 0.5 * usual_rate
-    known, assumed = 1.0 / np.maximum(sigma, 1e-4) ** 2, 1.0 / usual_sigma**2
-    agrees = measured * side > 0.0
-    rate = np.where(agrees, (measured * known + side * usual_rate * assumed) / (known + assumed), side * usual_rate)
+    side, turn_rate = _turning(measured, sigma, sides, usual_rate)
     gained = np.where(fresh, 0.0, np.maximum(np.abs(speed - before.speed) - SPEED_SIGMAS * velocity_sigma, 0.0))
     gained = gained / np.where(fresh, 1.0, elapsed_s)
     period_s = np.where(fresh, 1.0, elapsed_s)
     wander = _wander(before, speed, fresh, period_s)
     steady = np.where(np.isnan(wander), math.inf, WANDERS_LESS * np.sqrt(or_zero(wander)))
-    course_sigma = velocity_sigma / np.maximum(speed, LEAST_SPEED_MPS)
+    sure = np.clip(steady, SURE_AT_MOST * velocity_sigma, velocity_sigma)
     slow = np.minimum(speed, before.speed) < LEAST_SPEED_MPS
     turned = np.where(fresh | slow, 0.0, np.abs(wrap_rad(course - before.courses[:, 0])))
     turned = turned**3 / np.maximum(turned * turned + (2.0 * course_sigma) ** 2, 1e-12)  # as far as it is no noise
@@ -117,25 +111,21 @@ def motions(
         gusts=gusts,
         turned=all_turned,
     )
-    turn_rate, sure = np.where(side == 0, 0.0, rate), np.clip(steady, SURE_AT_MOST * velocity_sigma, velocity_sigma)
-    return (
-        Motions(
-            position,
-            velocity,
-            speed,
-            course,
-            side,
-            turn_rate,
-            usual_rate,
-            gained,
-            sure,
-            unsettled,
-            cruise,
-            gusts,
-            all_turned,
-        ),
-        minds,
-    )
+    kinematics = position, velocity, speed, course, side, turn_rate, usual_rate, gained, sure
+    return Motions(*kinematics, unsettled, cruise, gusts, all_turned), minds
+
+
+def _turning(measured: Floats, sigma: Floats, sides: Floats, usual_rate: Floats) -> tuple[Ints, Floats]:
+    """The side (n,) that each surely turns to, and how fast, of turn rates that were measured so well."""
+    by_modes = np.where(np.isnan(sides[:, 0]), 0, np.array([0, 1, -1])[or_zero(sides).argmax(axis=1)])
+    by_modes = np.where(or_zero(sides).max(axis=1) > intent.TURN_SURE, by_modes, 0)
+    by_course = np.where(np.abs(measured) > np.maximum(SURE_SIGMAS * sigma, LEAST_RATE_RPS), np.sign(measured), 0.0)
+    side = np.where(np.isnan(sides[:, 0]), by_course, by_modes).astype(np.int64)
+    usual_sigma = 0.5 * usual_rate
+    known, assumed = 1.0 / np.maximum(sigma, 1e-4) ** 2, 1.0 / usual_sigma**2
+    agrees = measured * side > 0.0
+    rate = np.where(agrees, (measured * known + side * usual_rate * assumed) / (known + assumed), side * usual_rate)
+    return side, np.where(side == 0, 0.0, rate)
 
 
 def _cruise(
