@@ -19,6 +19,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from adapters.told_fields import HIGHEST_M, json_object, number, place_rad
 from gateway.observation import Intent, WeatherArea
 from gateway.settings import Weather
 from gateway.settings.instants import instant_ns
@@ -26,7 +27,6 @@ from gateway.settings.instants import instant_ns
 DECLARED = "declared"
 LONGEST_LINE = 100_000
 _NAME_AT_MOST = 200
-_HIGHEST_M = 100_000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,13 +62,8 @@ def encode_weather(name: str, area: Weather | None) -> bytes:
 
 def decode(data: bytes, now: int, received_at: int) -> Intent | WeatherArea | None:
     """What a told line declares, at `now` in the session's time; None where it is not understood as a whole. Never raises."""
-    if len(data) > LONGEST_LINE:
-        return None
-    try:
-        told = json.loads(data)
-    except (ValueError, RecursionError):
-        return None
-    if not isinstance(told, dict):
+    told = json_object(data, LONGEST_LINE)
+    if told is None:
         return None
     if told.get("told") == "intent":
         return _intent(told, now, received_at)
@@ -95,7 +90,7 @@ def says_where(said: Intent) -> bool:
 def _intent(told: Mapping[str, Any], now: int, received_at: int) -> Intent | None:
     aircraft, name, item = told.get("aircraft"), told.get("to"), told.get("item")
     place = _place(told)
-    altitude = _number(told.get("altitude_msl_m"), _HIGHEST_M)
+    altitude = number(told.get("altitude_msl_m"), HIGHEST_M)
     if not _is_name(aircraft) or not (name is None or _is_name(name)) or place is None:
         return None
     if not (item is None or (type(item) is int and 0 <= item < 1 << 16)):
@@ -108,13 +103,13 @@ def _intent(told: Mapping[str, Any], now: int, received_at: int) -> Intent | Non
 
 
 def _weather(told: Mapping[str, Any], now: int, received_at: int) -> WeatherArea | None:
-    name, place, radius = told.get("name"), _place(told), _number(told.get("radius_m"), 1e7)
+    name, place, radius = told.get("name"), _place(told), number(told.get("radius_m"), 1e7)
     if not isinstance(name, str) or not _is_name(name) or place is None:
         return None
     corners = _corners(told.get("polygon_deg"))
     times = [told.get(key) for key in ("from", "until")]
     heights = [told.get(key) for key in ("base_msl_m", "top_msl_m")]
-    bounds = [_number(height, _HIGHEST_M) for height in heights]
+    bounds = [number(height, HIGHEST_M) for height in heights]
     if corners is None or any(given is not None and one is None for given, one in zip(heights, bounds, strict=True)):
         return None
     if any(one is not None and (not isinstance(one, str) or instant_ns(one) is None) for one in times):
@@ -128,11 +123,9 @@ def _weather(told: Mapping[str, Any], now: int, received_at: int) -> WeatherArea
 
 def _place(told: Mapping[str, Any]) -> tuple[float | None, float | None] | None:
     """Latitude and longitude, rad, or None for both; None where only one is given, or one is none."""
-    given = told.get("latitude_deg"), told.get("longitude_deg")
-    if given == (None, None):
+    if told.get("latitude_deg") is None and told.get("longitude_deg") is None:
         return None, None
-    latitude, longitude = _number(given[0], 90.0), _number(given[1], 180.0)
-    return None if latitude is None or longitude is None else (math.radians(latitude), math.radians(longitude))
+    return place_rad(told)
 
 
 def _corners(told: object) -> tuple[tuple[float, float], ...] | None:
@@ -143,10 +136,10 @@ def _corners(told: object) -> tuple[tuple[float, float], ...] | None:
         return None
     found = []
     for one in told:
-        place = _place(dict(zip(("latitude_deg", "longitude_deg"), one, strict=False))) if _is_pair(one) else None
-        if place is None or place[0] is None or place[1] is None:
+        place = place_rad(dict(zip(("latitude_deg", "longitude_deg"), one, strict=True))) if _is_pair(one) else None
+        if place is None:
             return None
-        found.append((place[0], place[1]))
+        found.append(place)
     return tuple(found)
 
 
@@ -156,13 +149,6 @@ def _is_pair(told: object) -> bool:
 
 def _is_name(told: object) -> bool:
     return isinstance(told, str) and 0 < len(told) <= _NAME_AT_MOST
-
-
-def _number(told: object, most: float) -> float | None:
-    """A finite number within plus and minus `most`; None for anything else."""
-    if isinstance(told, bool) or not isinstance(told, int | float):
-        return None
-    return float(told) if abs(told) <= most else None
 
 
 def _line(told: Mapping[str, Any]) -> bytes:

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
+from adapters.told_fields import HIGHEST_M, json_object, number, place_rad
 from adapters.vehicles import Registry
 from gateway.observation import FlightPlan, Observation, PlanPoint
 
@@ -23,7 +24,6 @@ Observations = tuple[Observation, ...]
 ANYBODY = "*"
 LONGEST_LINE = 4_000_000
 _KINDS = frozenset(("home", "waypoint", "loiter", "take-off", "landing", "other"))
-_ALTITUDES_M = 100_000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +42,8 @@ def encode_plan(aircraft: str, points: Sequence[PlanPoint]) -> bytes:
 
 def decode(data: bytes) -> ToldPlan | None:
     """What a told line says; None where it is not understood as a whole. Never raises."""
-    if len(data) > LONGEST_LINE:
-        return None
-    try:
-        told = json.loads(data)
-    except (ValueError, RecursionError):
-        return None
-    if not isinstance(told, dict) or told.get("told") != "plan" or not isinstance(told.get("points"), list):
+    told = json_object(data, LONGEST_LINE)
+    if told is None or told.get("told") != "plan" or not isinstance(told.get("points"), list):
         return None
     aircraft = told.get("aircraft", ANYBODY)
     points = [_point(one) for one in told["points"]]
@@ -77,27 +72,19 @@ def _plain(point: PlanPoint) -> dict[str, Any]:
 def _point(told: object) -> PlanPoint | None:
     if not isinstance(told, dict):
         return None
-    sequence, kind = told.get("sequence"), told.get("kind", "other")
-    latitude, longitude = _number(told.get("latitude_deg"), 90.0), _number(told.get("longitude_deg"), 180.0)
+    sequence, kind, place = told.get("sequence"), told.get("kind", "other"), place_rad(told)
     if type(sequence) is not int or not 0 <= sequence < 1 << 16 or not isinstance(kind, str) or kind not in _KINDS:
         return None
-    if latitude is None or longitude is None:
+    if place is None:
         return None
     altitudes = []
     for name in ("altitude_msl_m", "altitude_above_home_m"):
         given = told.get(name)
-        altitude = None if given is None else _number(given, _ALTITUDES_M)
+        altitude = None if given is None else number(given, HIGHEST_M)
         if given is not None and altitude is None:
             return None
         altitudes.append(altitude)
-    return PlanPoint(sequence, kind, math.radians(latitude), math.radians(longitude), *altitudes)
-
-
-def _number(told: object, most: float) -> float | None:
-    """A finite number within plus and minus `most`; None for anything else."""
-    if isinstance(told, bool) or not isinstance(told, int | float):
-        return None
-    return float(told) if abs(told) <= most else None
+    return PlanPoint(sequence, kind, *place, *altitudes)
 
 
 class ToldPlans:
