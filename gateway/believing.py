@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from gateway.align import SECOND, Fix, ReckonedFix
-from gateway.making import NAMED_AT_MOST, Making
+from gateway.making import Making
 from gateway.observation import GpsReport, Heard, Many, Observation, VehicleStatus
 from gateway.reckon import NOTHING, Easing, Reckoned, reads
 
@@ -83,11 +83,6 @@ class Believing(Making):
 
     def _enu_of(self, expected: Reckoned) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
         return self.frame.enu_from_geodetic(expected.latitude_rad, expected.longitude_rad, expected.height_m)
-
-    def _say_denied(self, text: str) -> None:
-        """Said once each time; of many vehicles only the first are named."""
-        if sum(", which inertial data deny" in about for about in self.said) < NAMED_AT_MOST:
-            self.once(text)
 
 
 def _received_at(told: Sequence[Observation]) -> int:
