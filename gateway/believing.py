@@ -43,6 +43,8 @@ class Believing(Making):
         if expected is None:
             return fix
         if self.site.dead_reckoning.refuses and (expected.denied != NOTHING or self._is_denied(fix, expected)):
+            if expected.denied == NOTHING:
+                self.reckoners = self.reckoners.suspecting(fix.aircraft)
             self.count("GPS reports that inertial data deny")
             return None
         return self._eased(fix, expected)

@@ -64,6 +64,7 @@ class Reckoners:
     types: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))  # MAV_TYPE
     waiting: tuple[Waiting, ...] = ()
     places: tuple[Place, ...] = ()
+    suspects: tuple[str, ...] = ()  # whose positions were refused as they came, since the last second
     planned: tuple[tuple[int, Share], ...] = ()  # when which vehicles go on
     easings: Mapping[str, Easing] = field(default_factory=lambda: MappingProxyType({}))
     crowded: bool = False  # more tell of their motion than are followed
@@ -112,6 +113,10 @@ class Reckoners:
         reckoner = self.by_aircraft.get(aircraft)
         return NOTHING if reckoner is None or reckoner.tip is None else int(reckoner.tip.denied[0])
 
+    def suspecting(self, aircraft: str) -> Reckoners:
+        """The same where a vehicle's position was refused as it came: that one is among the first to go on."""
+        return self if aircraft in self.suspects else replace(self, suspects=(*self.suspects, aircraft))
+
     def planning(self, at: int) -> Reckoners:
         """At a whole second, the same with all vehicles in shares, each with what was received before: a single one is due
         now, of several each in the middle of its part of the second. What was planned before must have been done.
@@ -125,23 +130,22 @@ class Reckoners:
         new = sorted(tells_inertial(told) - {*self.by_aircraft})
         room = max(VEHICLES_AT_MOST - len(self.by_aircraft), 0)
         known = {**self.by_aircraft, **{name: Reckoner() for name in new[:room]}}
-        names = tuple(known)
-        parts = [names[first : first + TOGETHER] for first in range(0, len(names), TOGETHER)]
-        number = {name: place for place, part in enumerate(parts) for name in part}
+        parts = _parts(tuple(known), self.suspects, at)
+        number = {name: place for place, (_, part) in enumerate(parts) for name in part}
         theirs = by_share(told, number)
-        shares = (
-            Share(
-                at,
-                part,
-                theirs.get(place, ()),
-                tuple(one for one in self.places if number.get(one[0]) == place),
-            )
-            for place, part in enumerate(parts)
+        planned = []
+        for place, (due, part) in enumerate(parts):
+            places = tuple(one for one in self.places if number.get(one[0]) == place)
+            planned.append((due, Share(at, part, theirs.get(place, ()), places)))
+        return replace(
+            self,
+            by_aircraft=known,
+            waiting=tuple(later),
+            places=(),
+            suspects=(),
+            planned=tuple(planned),
+            crowded=self.crowded or len(new) > room,
         )
-        middles = (at + (2 * place + 1) * SECOND // (2 * len(parts)) for place in range(len(parts)))
-        planned = tuple(zip(middles if len(parts) > 1 else (at,), shares, strict=False))
-        crowded = self.crowded or len(new) > room
-        return replace(self, by_aircraft=known, waiting=tuple(later), places=(), planned=planned, crowded=crowded)
 
     def advanced(self, history_ns: int, settings: DeadReckoning) -> Reckoners:
         """The same with the share that is due as far as what it was told reaches, its position sources judged."""
@@ -207,6 +211,17 @@ class Reckoners:
         told = replace(known.told, pictured=known.told.pictured.with_more(more))
         tips = untouched(known.tips, at)
         return replace(self, by_aircraft={**self.by_aircraft, aircraft: Reckoner(told, tips)})
+
+
+def _parts(names: Sequence[str], suspects: Sequence[str], at: int) -> list[tuple[int, tuple[str, ...]]]:
+    """Which vehicles go on when, within the second from an instant on."""
+    if len(names) <= TOGETHER:
+        return [(at, tuple(names))] if names else []
+    first = tuple(name for name in suspects if name in names)[:TOGETHER]
+    others = [name for name in names if name not in first]
+    parts = [tuple(others[place : place + TOGETHER]) for place in range(0, len(others), TOGETHER)]
+    middles = (at + (2 * place + 1) * SECOND // (2 * len(parts)) for place in range(len(parts)))
+    return [*([(at, first)] if first else []), *zip(middles, parts, strict=True)]
 
 
 def _by_aircraft(places: Sequence[Place]) -> dict[str, Series]:

@@ -13,12 +13,9 @@ import numpy as np
 import pytest
 
 from gateway.frames import RadarFrame, RunwayFrame, polar_from_xyz
-from gateway.observation import Attitude, GpsReport, Heard, ImuSample, Many, Observation, RadarPlot
+from gateway.observation import GpsReport, Heard, ImuSample, Many, Observation, RadarPlot
 from gateway.picture import Picture
 from gateway.pipeline import State, initial, step
-from gateway.reckon import reckoners as many
-from gateway.reckon.reckoners import TOGETHER, Reckoners
-from gateway.reckon.told import Series, before, by_share, portioned
 from gateway.settings import DeadReckoning, Options, RadarSite, Runway, Site
 from sim.inertial import aeroplane, car
 from sim.told_rides import Falsified, Teller, heard, honest
@@ -230,62 +227,6 @@ def test_how_arrivals_fall_into_steps_changes_no_bit() -> None:
 _COLUMNS = ("time", "latitude_rad", "longitude_rad", "height_m", "velocity_mps", "covariance", "wind_mps")
 
 
-CROWD = TOGETHER + 3
-
-
-@cache
-def crowd_told() -> tuple[Heard, ...]:
-    """Twelve seconds of more vehicles than a share has; for the last six without positions."""
-    tellers = []
-    for number in range(CROWD):
-        generator = np.random.default_rng([11, number])
-        falsified = lambda time_s: None if time_s > 6.0 else (0.0, 0.0, 0.0, 0.0)  # noqa: E731
-        tellers.append(Teller.of(f"mavlink:{number + 1}", 1, aeroplane(generator, 12.0), generator, falsified))
-    return tuple(heard(tellers, START, 5))
-
-
-def crowd_rows(at_once: int) -> list[tuple[int, str | None, str, bytes]]:
-    """What is written of a crowd, in order of time: when, of whom, by what, and the bits of where."""
-    said = [*crowd_told(), Heard(START + 14 * SECOND - 1)]
-    found = []
-    for picture in (one for _, one in pictures([*said, *said[-1:] * (-len(said) % at_once)], at_once)):
-        fuse = picture.fuse
-        for row, at in enumerate(fuse.time.tolist()):
-            bits = fuse.latitude_rad[row].tobytes() + fuse.velocity_mps[row].tobytes() + fuse.covariance[row].tobytes()
-            found.append((at, fuse.aircraft[row], fuse.updated_by[row], bits))
-    return sorted(found)
-
-
-def test_a_crowd_goes_on_in_shares_within_the_second_and_is_where_it_would_be_if_all_did_at_once(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    in_shares, at_once = crowd_rows(10), crowd_rows(200)
-    assert in_shares == at_once
-    led = [row for row in in_shares if row[2] == "dead-reckoning"]
-    assert len(led) >= 2 * CROWD
-    assert not [row for row in in_shares if row[2] == "coast"]
-    monkeypatch.setattr(many, "TOGETHER", CROWD)
-    assert [row for row in crowd_rows(200) if row[2] == "dead-reckoning"] == led
-
-
-def test_a_crowd_is_planned_in_shares_of_a_few_evenly_over_the_second_and_a_few_vehicles_at_once() -> None:
-    samples = [each for each in crowd_told()[0].observations if isinstance(each, Many)]
-    planned = Reckoners().hearing(0, samples).planning(START + SECOND).planned
-    assert [at - START - SECOND for at, _ in planned] == [SECOND // 4, 3 * SECOND // 4]
-    assert [len(share.names) for _, share in planned] == [TOGETHER, CROWD - TOGETHER]
-    assert [len(share.told) for _, share in planned] == [TOGETHER, CROWD - TOGETHER]
-    few = Reckoners().hearing(0, samples[:TOGETHER]).planning(START + SECOND).planned
-    assert [(at, len(share.names)) for at, share in few] == [(START + SECOND, TOGETHER)]
-
-
-def test_columns_of_several_vehicles_are_parted_among_their_shares() -> None:
-    one, other = (each for each in crowd_told()[0].observations[:8] if isinstance(each, Many))
-    both = Many(ImuSample, {name: np.concatenate([one.columns[name], other.columns[name]]) for name in one.columns})
-    shares = by_share([both], {"mavlink:1": 0, "mavlink:2": 1})
-    assert [[len(each) for each in shares[number]] for number in (0, 1)] == [[len(one)], [len(other)]]
-    assert portioned(shares[1])["mavlink:2"][0].values.tolist() == portioned([other])["mavlink:2"][0].values.tolist()
-
-
 def test_what_is_told_late_goes_back_to_its_place() -> None:
     """Two seconds of inertial samples that come 1.5 s late leave the same state as samples that came in time."""
     _, said = told("car", honest, 14.0)
@@ -311,40 +252,6 @@ def test_what_is_told_late_goes_back_to_its_place() -> None:
     assert b is not None
     assert a.latitude_rad == pytest.approx(b.latitude_rad, abs=1e-14)
     assert a.velocity_mps == pytest.approx(b.velocity_mps, abs=1e-9)
-
-
-def test_series_are_the_same_whatever_came_first() -> None:
-    generator = np.random.default_rng(1)
-    at, values = generator.integers(0, 30, 40), generator.standard_normal((40, 2))
-    once = Series.empty(2).with_more(Series(at, values))
-    order = generator.permutation(40)
-    parts = Series.empty(2)
-    for place in order:
-        parts = parts.with_more(Series(at[place : place + 1], values[place : place + 1]))
-    assert once.at.tolist() == parts.at.tolist()
-    assert once.values.tolist() == parts.values.tolist()
-
-
-def test_what_was_received_at_an_instant_or_later_waits_for_the_next() -> None:
-    _, said = told("car", honest, 14.0)
-    samples = [each for one in said[:3] for each in one.observations if isinstance(each, Many)]
-    until = int(samples[1].columns["received_at"][0])
-    earlier, later = before(samples, until)
-    portion = portioned(earlier)
-    assert len(portion["mavlink:1"][0].at) == 5
-    assert sum(len(one) for one in later if isinstance(one, Many)) == 10
-
-
-def test_what_waits_one_by_one_keeps_its_order_and_is_few_parts() -> None:
-    """Tens of thousands a second come one by one before the session's time has settled: the parts must not be copied for each."""
-    reckoners = Reckoners()
-    for number in range(1000):
-        reckoners = reckoners.hearing(
-            SECOND if number >= 900 else 0, [Attitude("mavlink:1", number, number, 0.0, 0.0, 0.0)]
-        )
-    assert len(reckoners.waiting) <= 20
-    said = [(added, one.received_at) for added, some in reckoners.waiting for one in some]
-    assert said == [(SECOND if number >= 900 else 0, number) for number in range(1000)]
 
 
 def test_a_vehicle_without_an_inertial_unit_is_nothing_to_dead_reckoning() -> None:
