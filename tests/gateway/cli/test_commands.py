@@ -24,6 +24,7 @@ COMMANDS = (
     "check",
     "columns",
     "reconstruct",
+    "report",
     "site",
     "study",
     "sessions",
