@@ -9,19 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
 Heading = tuple[int, float, float]  # since when, ns; east and north of the point, NaN = nowhere
 Point = tuple[float, float]
 NOWHERE: Point = (math.nan, math.nan)
-NOBODY: Mapping[str, tuple[Heading, ...]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
 class Headings:
     """By aircraft where it has said that it goes, in the order of time, as far back as late data may come."""
 
-    by_aircraft: Mapping[str, tuple[Heading, ...]] = field(default_factory=lambda: NOBODY)
+    by_aircraft: Mapping[str, tuple[Heading, ...]] = field(default_factory=dict)
 
     def of(self, aircraft: str | None) -> tuple[Heading, ...]:
         """One aircraft's; none of who has said nothing, and of tracks that are no aircraft."""

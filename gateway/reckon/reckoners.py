@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 
 import numpy as np
 
@@ -60,13 +59,13 @@ class Easing:
 class Reckoners:
     """All vehicles that tell of their own motion."""
 
-    by_aircraft: Mapping[str, Reckoner] = field(default_factory=lambda: MappingProxyType({}))
-    types: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))  # MAV_TYPE
+    by_aircraft: Mapping[str, Reckoner] = field(default_factory=dict)
+    types: Mapping[str, int] = field(default_factory=dict)  # MAV_TYPE
     waiting: tuple[Waiting, ...] = ()
     places: tuple[Place, ...] = ()
     suspects: tuple[str, ...] = ()  # whose positions were refused as they came, since the last second
     planned: tuple[tuple[int, Share], ...] = ()  # when which vehicles go on
-    easings: Mapping[str, Easing] = field(default_factory=lambda: MappingProxyType({}))
+    easings: Mapping[str, Easing] = field(default_factory=dict)
     crowded: bool = False  # more tell of their motion than are followed
 
     def hearing(self, added: int, observations: Sequence[Observation]) -> Reckoners:
