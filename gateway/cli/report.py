@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _HELP = """
 Judge the approaches of an archived session: deviations from glide path and centreline with ICAO Annex 10's limits, the gates of
 a stabilised approach, touchdown, what each source saw, accuracy against the truth where there is one, and a grade with its
-reasons. --html writes one file that needs nothing else and prints a page an approach.
+reasons. --html writes one file that needs nothing else and prints well.
 
 Examples:
 

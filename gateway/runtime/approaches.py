@@ -46,7 +46,7 @@ def approaches_of(session: Path) -> Reported:
 
     record = read_record(session)
     if record.site is None or not (session / "tracks.parquet").is_file():
-        raise FolderError(f"{session} holds no tracks: it ended before its place was known.")
+        raise FolderError(f"{session} holds no tracks yet: it still runs, or it ended before its place was known.")
     try:
         site = parse_site(record.site)
     except SiteError as error:
@@ -66,8 +66,8 @@ def approaches_of(session: Path) -> Reported:
     found: list[Approach] = []
     for name in dict.fromkeys(names):
         own = _last_of_each_time(tracks.filter(of_track == name))
-        told = true.filter(of_truth == name)
-        known = _flown(_last_of_each_time(told), frame) if len(told) > 1 else None
+        told = _last_of_each_time(true.filter(of_truth == name))
+        known = _flown(told, frame) if len(told) > 1 else None
         found += approaches(site, name, _flown(own, frame), _heard(own, offset_ns), known)
     return Reported(session, record, site, tuple(sorted(found, key=lambda one: int(one.course.time[0]))))
 

@@ -1,4 +1,4 @@
-"""Approach reports as one HTML file that needs nothing else: each approach on a page of its own when printed."""
+"""Approach reports as one HTML file that needs nothing else: each approach begins a new sheet when printed."""
 
 from __future__ import annotations
 
@@ -32,7 +32,9 @@ break-inside: avoid; font: 11px system-ui, sans-serif } .title { font-weight: 60
 .middle { text-anchor: middle }
 .end { text-anchor: end } .grid { stroke: #e3e3e3 } .zero { stroke: #777 } .line { fill: none; stroke-width: 1.6 }
 .mark { stroke: #888; stroke-dasharray: 2 3 } .note { color: #555; font-size: .9em }
-@media print { body { margin: 0; max-width: none; font-size: 11px } h2 { break-after: avoid } table { break-inside: avoid } }
+@page { size: A4; margin: 12mm }
+@media print { body { margin: 0; max-width: none; padding: 0; font-size: 10.5px } h2 { break-after: avoid; margin: .5em 0 .2em }
+p, ul { margin: .3em 0 } table { break-inside: avoid } }
 """
 
 
