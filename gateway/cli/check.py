@@ -16,7 +16,7 @@ from rich.table import Table
 from gateway.cli import options as take
 from gateway.cli.failures import UsageError
 from gateway.cli.progress import progressing
-from gateway.cli.replay import FilesArgument
+from gateway.cli.replay_options import FilesArgument
 
 if TYPE_CHECKING:
     from gateway.runtime.findings import Finding

@@ -12,8 +12,8 @@ import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
-from gateway.cli.live_options import Declares, Links, PlanOption, SecondsOption, Sending, Trust
-from gateway.cli.replay import read_plans
+from gateway.cli.live_options import Declares, Links, SecondsOption, Sending, Trust
+from gateway.cli.replay_options import PlanOption, read_plans
 from gateway.cli.spread import spread
 
 if TYPE_CHECKING:

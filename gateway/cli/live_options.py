@@ -24,15 +24,6 @@ _LINKS, _SENDING, _TRUST = "Links", "What is sent", "Who is believed"
 SecondsOption = Annotated[
     float | None, typer.Option("--seconds", metavar="S", min=0.0, help="End after so many seconds.", show_default=False)
 ]
-PlanOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--plan",
-        metavar="[VEHICLE=]FILE",
-        help="A mission file (.plan, QGC WPL 110), and whose it is, such as mavlink:2=circuit.plan; repeatable.",
-        show_default=False,
-    ),
-]
 
 
 @dataclass(frozen=True, slots=True)

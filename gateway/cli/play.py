@@ -9,7 +9,7 @@ import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
-from gateway.cli.replay import FilesArgument, FromOption, ToOption, read_speed, seek
+from gateway.cli.replay_options import FilesArgument, FromOption, ToOption, read_speed, seek
 
 _HELP = """
 Send a recording onto UDP as it once came in, frame by frame, at its own intervals: for a `talkdown live`, or any ground

@@ -14,7 +14,7 @@ import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
-from gateway.cli.replay import FilesArgument, MuteOption
+from gateway.cli.replay_options import FilesArgument, MuteOption
 
 if TYPE_CHECKING:
     from gateway.offline.reconstruction import How, Place, Sortie

@@ -13,7 +13,7 @@ import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
-from gateway.cli.replay import FilesArgument
+from gateway.cli.replay_options import FilesArgument
 
 if TYPE_CHECKING:
     from gateway.estimators.registration import Method

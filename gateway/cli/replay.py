@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-import re
 import sys
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
+from gateway.cli.replay_options import (
+    FilesArgument,
+    Methods,
+    PlanOption,
+    Section,
+    SmoothOption,
+    SpeedOption,
+    read_plans,
+    read_speed,
+)
 from gateway.cli.spread import spread
 
 if TYPE_CHECKING:
@@ -49,165 +57,10 @@ _SMOOTHED_IN_PASSING = """The smoothed tracks are compared with the truth and dr
 to keep them, name a folder with --archive."""
 SMOOTHED = ("kalman", "imm", "rmimm")  # the estimators that a smoother can go back over
 
-FilesArgument = Annotated[
-    list[Path],
-    typer.Argument(metavar="FILE|SESSION...", help="Recordings, or one archived session.", show_default=False),
-]
-
-
-SpeedOption = Annotated[
-    str | None,
-    typer.Option(
-        "--speed",
-        metavar="max|N",
-        help="N times its own pace. (default: 1 with a viewer, max without)",
-        show_default=False,
-    ),
-]
-FromOption = Annotated[
-    str | None,
-    typer.Option(
-        "--from",
-        metavar="T",
-        help="Begin here: 90, 1:30 or 1:02:03 after the start, or UTC (00:05:00Z, 2026-01-01T00:05:00Z).",
-        show_default=False,
-    ),
-]
-ToOption = Annotated[
-    str | None, typer.Option("--to", metavar="T", help="End here; written as for --from.", show_default=False)
-]
-MuteOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--mute",
-        metavar="WHAT[:N][:T:T]",
-        help="Do not listen to gps or radar (number N) from T to T; may be given several times.",
-        show_default=False,
-    ),
-]
-PlanOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--plan",
-        metavar="VEHICLE=FILE",
-        help="A mission file and whose it is, such as mavlink:2=circuit.plan; may be given several times.",
-        show_default=False,
-    ),
-]
-SmoothOption = Annotated[
-    bool,
-    typer.Option(
-        "--smooth", help="When it is over, make smoothed tracks: what later measurements tell of each instant."
-    ),
-]
-
-
-@dataclass(frozen=True, slots=True)
-class Section:
-    """Which part of a recording is run, and without which sources."""
-
-    begin: FromOption = None
-    end: ToOption = None
-    mute: MuteOption = None
-
-
-@dataclass(frozen=True, slots=True)
-class Methods:
-    """How tracks are made; None = as in the session."""
-
-    estimator: Annotated[
-        take.Estimator | None,
-        typer.Option("--estimator", help="How tracks move. (default: the session's, else kalman)", show_default=False),
-    ] = None
-    weighting: Annotated[
-        take.Weighting | None,
-        typer.Option(
-            "--weighting", help="How GPS and radar are weighed. (default: the session's, else bias)", show_default=False
-        ),
-    ] = None
-    association: Annotated[
-        take.Association | None,
-        typer.Option(
-            "--association", help="When two are one. (default: the session's, else default)", show_default=False
-        ),
-    ] = None
-    registration: Annotated[
-        take.Registration | None,
-        typer.Option(
-            "--registration",
-            help="What radars measure too much: learnt and taken off, only told, or neither. "
-            "(default: the session's, else apply)",
-            show_default=False,
-        ),
-    ] = None
-    dead_reckoning: Annotated[
-        take.DeadReckoning | None,
-        typer.Option(
-            "--dead-reckoning",
-            help="Whether vehicles go on by what they tell of their own motion. (default: the session's, else on)",
-            show_default=False,
-        ),
-    ] = None
-
-    def change(self, options: Options) -> Options:
-        """The options with what was asked for in place of what was archived."""
-        chosen = (self.weighting, self.association, self.estimator, self.registration, self.dead_reckoning)
-        return take.change(options, *chosen)
-
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
     app.command("replay", help=_HELP)(spread(replay))
-
-
-def read_speed(text: str | None, default: float | None) -> float | None:
-    """How fast: a factor, or None for as fast as it goes. Raises UsageError."""
-    if text is None:
-        return default
-    if text == "max":
-        return None
-    try:
-        speed = float(text)
-    except ValueError:
-        speed = float("nan")
-    if not 0.0 < speed <= 1e6:
-        raise UsageError(f"--speed {text!r} is neither a number above 0, such as 1 or 10, nor max.")
-    return speed
-
-
-def read_plans(texts: list[str] | None) -> list[tuple[str | None, Path]]:
-    """Mission files, each with its vehicle where it is named. Raises UsageError."""
-    plans: list[tuple[str | None, Path]] = []
-    for text in texts or []:
-        vehicle, equals, file = text.partition("=")
-        if equals and file and re.fullmatch(r"mavlink:\d{1,3}(@\d+)?", vehicle):
-            plans.append((vehicle, Path(file)))
-        elif not equals and text:
-            plans.append((None, Path(text)))
-        else:
-            raise UsageError(f"--plan {text!r} is not understood: write mavlink:2=FILE, or FILE for the only vehicle.")
-    return plans
-
-
-def seek(
-    playback: Playback, options: Options, begin: str | None, end: str | None, mutes: list[str] | None
-) -> tuple[Playback, Options]:
-    """The recording and the options with what --from, --to and --mute say. Raises SeekError."""
-    from gateway.runtime.seeking import SeekError
-
-    if begin is None and end is None and not mutes:
-        return playback, options
-    span = playback.span()
-    if begin is not None:
-        options = replace(options, begins_at=span.instant(begin, "--from"))
-    if mutes:
-        options = replace(options, mutes=tuple(span.mute(text) for text in mutes))
-    if end is not None:
-        ends_at = span.instant(end, "--to")
-        if options.begins_at is not None and ends_at <= options.begins_at:
-            raise SeekError(f"--to {end} is not after where the replay begins.")
-        playback = replace(playback, watermark=ends_at)
-    return playback, options
 
 
 def check_smoothing(options: Options) -> None:
@@ -250,7 +103,7 @@ def replay(
         options = methods.change(playback.options)
         if smooth:
             check_smoothing(options)
-        playback, options = seek(playback, options, section.begin, section.end, section.mute)
+        playback, options = section.cut(playback, options)
         setup = replace(
             _setup(playback, place, files[0].stem, seen, looks),
             options=options,
@@ -264,8 +117,7 @@ def replay(
             Viewing(looks) as viewing,
             Display(viewing, quiet=telling.quiet, as_json=telling.json, fraction=playback.fraction) as display,
         ):
-            passing = (_SMOOTHED_IN_PASSING,) if smooth and seen.archive is None else ()
-            for note in (*playback.notes, *passing):
+            for note in _notes(playback, is_kept=not smooth or seen.archive is not None):
                 display.say(note)
             summary = run_replay(
                 playback,
@@ -280,6 +132,11 @@ def replay(
         raise UsageError(str(error)) from error
     except RunFailure as failure:
         raise RunError(str(failure)) from failure
+
+
+def _notes(playback: Playback, *, is_kept: bool) -> tuple[str, ...]:
+    """What there is to say before it begins; `is_kept`: what is smoothed goes to an archive, or nothing is."""
+    return playback.notes if is_kept else (*playback.notes, _SMOOTHED_IN_PASSING)
 
 
 def _setup(playback: Playback, place: Place | None, stem: str, seen: take.Seen, looks: take.Viewer) -> Setup:

@@ -12,7 +12,7 @@ import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
-from gateway.cli.replay import read_speed
+from gateway.cli.replay_options import read_speed
 
 if TYPE_CHECKING:
     from sim.scene import Scene

@@ -12,7 +12,7 @@ from gateway.cli.failures import Failure
 from gateway.cli.live import live
 from gateway.cli.live_options import Links
 from gateway.cli.options import Viewer
-from gateway.cli.replay import read_speed
+from gateway.cli.replay_options import read_speed
 from gateway.cli.viewing import chosen
 
 COMMANDS = (
