@@ -122,6 +122,11 @@ def found(tracks: Sequence[Track], method: Method = "default", *, least_flights:
     if method == "default":
         alike = _by_shape(places, least_flights)
         aside_m = _aside(places[..., :2], alike)
+        if (alike == OUTLIER).all():  # HDBSCAN parts: where all came one way it finds none
+            whole = np.zeros(len(tracks), dtype=np.int64)
+            aside_m = _aside(places[..., :2], whole)
+            if float(np.median(aside_m)) <= CORRIDOR_M:
+                alike = whole
         labels = _typical(alike, aside_m, places[..., :2], least_flights)
     else:
         labels = _by_centres(tracks, method, least_flights)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import gzip
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -133,6 +134,21 @@ def test_who_lands_the_other_way_or_is_far_aside_is_of_no_flow() -> None:
     flows = found(tracks)
     assert [len(flow.flights) for flow in flows.flows] == [10, 10]
     assert [tracks[row].name for row in np.flatnonzero(flows.labels == OUTLIER)] == ["far", "against"]
+
+
+def test_where_all_come_one_way_there_is_one_flow_and_where_each_comes_its_own_none() -> None:
+    """Nine flights along one line, and a tenth 20 km aside, which is alone; ten from all over the sky are no flow."""
+    generator = np.random.default_rng(6)
+    to_go = np.linspace(70_000.0, 0.0, 300)[:, None]
+
+    def flown(number: int, bearing: float) -> Track:
+        along = np.array([math.sin(bearing), math.cos(bearing), 0.05])
+        return Track(f"f{number}", np.arange(-299.0, 1.0), to_go * along)
+
+    one_way = [flown(number, 1.0 + generator.normal(0.0, 0.005)) for number in range(9)] + [flown(9, 1.4)]
+    assert found(one_way).labels.tolist() == [0] * 9 + [OUTLIER]
+    each = [flown(number, 0.6 * number) for number in range(10)]
+    assert found(each).labels.tolist() == [OUTLIER] * 10
 
 
 @pytest.mark.skipif(not DATA.exists(), reason="the recordings are not beside the project")
