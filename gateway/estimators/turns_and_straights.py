@@ -34,21 +34,21 @@ class Path:
     @classmethod
     def at_start(cls, position: Floats, course: Floats, horizons: Floats) -> Path:
         """A path of no length."""
-        nothing, zero = np.zeros(len(course)), np.zeros(horizons.shape)
-        return cls(position, course, nothing, nothing, horizons, zero, zero, zero, zero, zero)
+        nothing = np.zeros(len(course))
+        return cls(position, course, nothing, nothing, horizons, *np.zeros((5, *horizons.shape)))
 
     def extend(self, speed: Floats, rate: Floats, duration_s: Floats, passed: int) -> None:
         """Fly on with these ground speeds and turn rates (n,) for so long (n,); all later horizons are on it so far."""
         since = self.horizons - self.time_s[:, None]
         on = since >= 0.0
         chord, bend = _arc(rate[:, None] * since)
-        middle = self.course[:, None] + bend
+        middle, turn = self.course[:, None] + bend, 2.0 * bend
         length = speed[:, None] * since * chord
-        self.east_at = np.where(on, self.position[:, 0, None] + length * np.cos(middle), self.east_at)
-        self.north_at = np.where(on, self.position[:, 1, None] + length * np.sin(middle), self.north_at)
-        self.course_at = np.where(on, self.course[:, None] + 2.0 * bend, self.course_at)
-        self.turned_at = np.where(on, self.turned[:, None] + np.abs(2.0 * bend), self.turned_at)
-        self.passed_at = np.where(on, float(passed), self.passed_at)
+        np.copyto(self.east_at, self.position[:, 0, None] + length * np.cos(middle), where=on)
+        np.copyto(self.north_at, self.position[:, 1, None] + length * np.sin(middle), where=on)
+        np.copyto(self.course_at, self.course[:, None] + turn, where=on)
+        np.copyto(self.turned_at, self.turned[:, None] + np.abs(turn), where=on)
+        np.copyto(self.passed_at, float(passed), where=on)
         chord, bend = _arc(rate * duration_s)
         length = speed * duration_s * chord
         middle = self.course + bend
@@ -62,11 +62,11 @@ class Path:
         since = self.horizons - self.time_s[:, None]
         on, length = since >= 0.0, speed[:, None] * since
         cosine, sine = np.cos(self.course), np.sin(self.course)
-        self.east_at = np.where(on, self.position[:, 0, None] + length * cosine[:, None], self.east_at)
-        self.north_at = np.where(on, self.position[:, 1, None] + length * sine[:, None], self.north_at)
-        self.course_at = np.where(on, self.course[:, None], self.course_at)
-        self.turned_at = np.where(on, self.turned[:, None], self.turned_at)
-        self.passed_at = np.where(on, float(passed), self.passed_at)
+        np.copyto(self.east_at, self.position[:, 0, None] + length * cosine[:, None], where=on)
+        np.copyto(self.north_at, self.position[:, 1, None] + length * sine[:, None], where=on)
+        np.copyto(self.course_at, self.course[:, None], where=on)
+        np.copyto(self.turned_at, self.turned[:, None], where=on)
+        np.copyto(self.passed_at, float(passed), where=on)
         self.position = self.position + (speed * duration_s)[:, None] * np.stack([cosine, sine], axis=-1)
         self.time_s = self.time_s + duration_s
 
@@ -76,11 +76,11 @@ class Path:
         on = self.horizons >= self.time_s[:, None]
         moving = np.minimum(since, (speed / np.maximum(braking, 1e-9))[:, None])
         length = speed[:, None] * moving - 0.5 * braking[:, None] * moving * moving
-        self.east_at = np.where(on, self.position[:, 0, None] + length * np.cos(self.course)[:, None], self.east_at)
-        self.north_at = np.where(on, self.position[:, 1, None] + length * np.sin(self.course)[:, None], self.north_at)
-        self.course_at = np.where(on, self.course[:, None], self.course_at)
-        self.turned_at = np.where(on, self.turned[:, None], self.turned_at)
-        self.passed_at = np.where(on, float(passed), self.passed_at)
+        np.copyto(self.east_at, self.position[:, 0, None] + length * np.cos(self.course)[:, None], where=on)
+        np.copyto(self.north_at, self.position[:, 1, None] + length * np.sin(self.course)[:, None], where=on)
+        np.copyto(self.course_at, self.course[:, None], where=on)
+        np.copyto(self.turned_at, self.turned[:, None], where=on)
+        np.copyto(self.passed_at, float(passed), where=on)
 
 
 def or_zero(values: Floats) -> Floats:

@@ -117,12 +117,15 @@ def ahead(
     turn, rate, follows = _first_turn(now, speed, course, target, following, turning_rps, rule)
     turn, follows = np.where(arrived, 0.0, turn), follows | arrived
     ground, cornering, slower_from = speed, turning_rps, np.full(n, math.inf)
+    looked_at_s = path.horizons.max(axis=1)
 
     def speed_on(heading: Floats) -> Floats:
         return ground_speed(heading, air, calm)
 
     for leg in range(route.shape[1]):
         if leg:
+            if (path.time_s > looked_at_s).all():  # what comes after the last horizon is nothing to anybody
+                break
             if slower is not None:
                 slower_from = np.where(slower[:, leg] < 1.0, np.minimum(slower_from, path.time_s), slower_from)
                 air = air * slower[:, leg]
@@ -138,7 +141,13 @@ def ahead(
             ground = speed_on(path.course)
     path.stop(ground, np.zeros(n) if braking is None else braking, route.shape[1])
     on = Path.at_start(now.position, course, path.horizons)
-    on.extend(speed, now.turn_rate, np.zeros(n), 0)
+    if not follows.all():
+        on.extend(speed, now.turn_rate, np.zeros(n), 0)
+    return _either(path, on, slower_from, follows)
+
+
+def _either(path: Path, on: Path, slower_from: Floats, follows: Bools) -> Ahead:
+    """Along the route of who follows it, on in the present turn of others."""
     chosen = follows[:, None]
     return Ahead(
         np.stack([np.where(chosen, path.east_at, on.east_at), np.where(chosen, path.north_at, on.north_at)], axis=-1),

@@ -56,6 +56,8 @@ def weighed(at: int, tracks: Sequence[int], goals: Sequence[Goals], share: Float
 
 def table(rounds: Sequence[Weighed], frame: RunwayFrame) -> Candidates:
     """Candidates as columns."""
+    if not rounds:
+        return NO_CANDIDATES
     places = np.concatenate([np.zeros((0, 3)), *(one.places for one in rounds)])
     level = turn(frame.runway_from_enu, np.nan_to_num(places))
     level[np.isnan(places[:, 2]), 2] = math.nan

@@ -100,7 +100,7 @@ def ways_of(
 def _joins_final(place: Floats, frame: RunwayFrame) -> Bools:
     """From where on (n, g) aircraft have crossed the final at a height from which they may join it: who does so turns there."""
     runway = frame.runway
-    x, y, up = np.moveaxis(turn(frame.runway_from_enu, place), -1, 0)
+    x, y, up = np.ascontiguousarray(np.moveaxis(turn(frame.runway_from_enu, place), -1, 0))
     before_m = runway.aiming_point_x_m - x
     crosses = (y[:, 1:] * y[:, :-1] <= 0.0) & (np.abs(np.diff(y, axis=1)) > np.abs(np.diff(x, axis=1)) * CROSSES)
     low = up < before_m * math.tan(runway.glide_path_rad) + ABOVE_GLIDE_PATH_M
@@ -123,7 +123,10 @@ def path_on(times_s: Floats, known_s: Floats, place: Floats, course: Floats) -> 
     begins = k * np.arange(n)[:, None]
     order = np.argsort(known_s, axis=1, kind="stable") + begins
     known = known_s.take(order)
-    first = np.clip((known[:, :, None] <= times_s).sum(axis=1) - 1, 0, k - 2) + begins
+    passed = (
+        (np.ascontiguousarray(known.T)[:, None] <= times_s[:, None]).sum(axis=0).T
+    )  # in this order of axes: swiftly
+    first = np.clip(passed - 1, 0, k - 2) + begins
     before, after = order.take(first), order.take(first + 1)
 
     def ends(values: Floats) -> tuple[Floats, Floats]:
