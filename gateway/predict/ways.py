@@ -82,11 +82,9 @@ def ways_of(
     level, course = path_on(times, known_s, whole.position, whole.course)
     known = np.concatenate([[0.0], horizons_s])
     up_now = state.up + state.climb * state.since_s
-    height = between(times, known, np.concatenate([up_now[:, None], up], axis=1))
-    along, across = (
-        between(times, known, np.concatenate([state.place_sigma[:, None], sigma], axis=1))
-        for sigma in (spread.along, spread.across)
-    )
+    told = (up_now, up), (state.place_sigma, spread.along), (state.place_sigma, spread.across)
+    values = np.stack([np.concatenate([now[:, None], later], axis=1) for now, later in told])
+    height, along, across = between(times, known, values)
     wanders = state.climb_sigma**2 + (LEVELS_OFF * state.climb) ** 2 + CLIMBS_MPS**2
     upright = np.sqrt(state.up_sigma[:, None] ** 2 + wanders[:, None] * times * times)
     place = np.concatenate([level, height[..., None]], axis=2)
@@ -148,10 +146,10 @@ def path_on(times_s: Floats, known_s: Floats, place: Floats, course: Floats) -> 
 
 
 def between(times_s: Floats, known_s: Floats, values: Floats) -> Floats:
-    """Values (n, g) at times (g,), straight between those (n, k) at `known_s` (k,), which ascend."""
+    """Values (..., g) at times (g,), straight between those (..., k) at `known_s` (k,), which ascend."""
     first = np.clip(np.searchsorted(known_s, times_s, side="right") - 1, 0, len(known_s) - 2)
     share = np.clip((times_s - known_s[first]) / (known_s[first + 1] - known_s[first]), 0.0, 1.0)
-    return np.asarray(values[:, first] * (1.0 - share) + values[:, first + 1] * share)
+    return np.asarray(values[..., first] * (1.0 - share) + values[..., first + 1] * share)
 
 
 def at_instant(ways: Ways, at: int, times_s: Floats) -> Floats:
