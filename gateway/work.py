@@ -255,6 +255,12 @@ class Work(Associating):
             return
         self.probing, found = self.probing.watching(at, list(alive), self.site.separation)
         self.rounds.append(found)
+        if found.untold:
+            self.count("conflicts beyond those that are told", found.untold)
+            self.once(
+                f"more than {predict.TOLD_AT_MOST} conflicts at once: the soonest are told; where aircraft "
+                "fly together on purpose, make [separation] of the site file smaller"
+            )
         for row, state in enumerate(found.state):
             if state != "goes on":
                 pair = [alive[number] for number in found.told.pair[row].tolist() if number in alive]

@@ -8,7 +8,7 @@ near each other, `conflicts` what is told of that.
 """
 
 from gateway.predict.candidates import Candidates
-from gateway.predict.conflicts import Conflicts, Probing, Round, sentence
+from gateway.predict.conflicts import TOLD_AT_MOST, Conflicts, Probing, Round, sentence
 from gateway.predict.forecasting import forecast
 from gateway.predict.predicting import TOGETHER, Predicting
 from gateway.predict.table import Forecast, Predicted, table
@@ -16,6 +16,7 @@ from gateway.predict.told import Said
 
 __all__ = [
     "TOGETHER",
+    "TOLD_AT_MOST",
     "Candidates",
     "Conflicts",
     "Forecast",

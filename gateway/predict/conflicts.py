@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ Ints = NDArray[np.int64]
 
 TOLD_AFTER, CLEARED_AFTER = 3, 5  # rounds in a row
 LESS_PROBABLE = 0.5  # of the probability that is told: what is still as probable goes on
+WATCHED_AT_MOST, TOLD_AT_MOST = 500, 50  # pairs at a time: of a swarm nobody could read more
 
 Pair = tuple[int, int]
 """The numbers of two tracks, the smaller first."""
@@ -66,6 +67,7 @@ class Round:
     at: int
     told: Encounters
     state: tuple[str, ...]
+    untold: int = 0  # conflicts beyond those, later than they
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,12 +104,18 @@ class Probing:
         return self if self.near is None else replace(self, near=None, met=encounters(self.near, separation))
 
     def watching(self, at: int, alive: Sequence[int], separation: Separation) -> tuple[Probing, Round]:
-        """The round told at an instant, of the tracks with these numbers; what is remembered after it."""
+        """The round told at an instant, of the tracks with these numbers; what is remembered after it.
+
+        Of a swarm, where each is near everybody, the pairs that lose their separation soonest are watched and told.
+        """
         met = Encounters.joined([]) if self.met is None else self.met
-        near = {(first, second): row for row, (first, second) in enumerate(map(tuple, met.pair.tolist()))}
+        near = _soonest(met, self.last)
         conflict = (met.ratio < 1.0) & (met.probability >= separation.least_probability)
         still = conflict | (met.probability >= LESS_PROBABLE * separation.least_probability)
         watched: dict[Pair, Watched] = {}
+        due = [pair for pair, row in near.items() if conflict[row] and _is_due(self.watched.get(pair))]
+        room = TOLD_AT_MOST - len(self.last)
+        waits = set(due[max(room, 0) :])
         told: list[tuple[Met, str]] = []
         last: dict[Pair, Met] = {}
         here = set(alive)
@@ -115,6 +123,8 @@ class Probing:
             row = near.get(pair)
             before = self.watched.get(pair, Watched())
             now = _watched(before, at, row is not None and bool(conflict[row]), row is not None and bool(still[row]))
+            if now is not None and pair in waits:
+                now = replace(now, since=None)
             if before.since is not None and (now is None or not here.issuperset(pair)):
                 told.append((self.last[pair], "over"))
                 continue
@@ -125,8 +135,23 @@ class Probing:
                 last[pair] = self.last[pair] if row is None else (met, row)
                 told.append((last[pair], "found" if before.since is None else "goes on"))
         return replace(self, watched=watched, last=last, near=None, met=None), Round(
-            at, _of([one for one, _ in told]), tuple(state for _, state in told)
+            at, _of([one for one, _ in told]), tuple(state for _, state in told), len(waits)
         )
+
+
+def _soonest(met: Encounters, told: Container[Pair]) -> dict[Pair, int]:
+    """The rows of encounters by their pairs, who loses the separation soonest first: all that are told, and some others."""
+    order = np.lexsort((met.pair[:, 1], met.pair[:, 0], met.loses_at)).tolist()
+    rows = {(first, second): row for (first, second), row in zip(met.pair[order].tolist(), order, strict=True)}
+    others = [pair for pair in rows if pair not in told]
+    for pair in others[WATCHED_AT_MOST:]:
+        del rows[pair]
+    return rows
+
+
+def _is_due(before: Watched | None) -> bool:
+    """Whether a pair that is a conflict once more has been one for long enough to be told, and is not told yet."""
+    return before is not None and before.since is None and before.found + 1 >= TOLD_AFTER
 
 
 def _of(some: Sequence[Met]) -> Encounters:

@@ -155,6 +155,30 @@ HEAD_ON = {
 }
 
 
+def test_of_a_swarm_the_soonest_are_told() -> None:
+    """Of a hundred pairs that meet one after the other the first fifty are told, and the next where one of these is over."""
+    number = np.arange(100.0)
+    one = np.stack([np.zeros(100), 20e3 * number, np.full(100, 1000.0)], axis=-1)
+    other = one + np.stack([7000.0 + 40.0 * number, np.zeros(100), np.zeros(100)], axis=-1)
+    still, west = np.zeros((100, 3)), np.tile([-100.0, 0.0, 0.0], (100, 1))
+    here = ways(np.concatenate([one, other]).tolist(), np.concatenate([still, west]).tolist())
+    probing, everybody = Probing().hearing(here, T0, 10.0), list(range(1, 201))
+    for rounds in range(3):
+        looked = probing.looking(T0 + rounds * SECOND, everybody, Separation()).meeting(Separation())
+        probing, found = looked.watching(T0 + rounds * SECOND, everybody, Separation())
+    assert sorted(found.told.pair[:, 0].tolist()) == list(range(1, 51))
+    assert found.untold == 50
+    alive = [track for track in everybody if track != 1]
+    looked = probing.looking(T0 + 3 * SECOND, alive, Separation()).meeting(Separation())
+    probing, over = looked.watching(T0 + 3 * SECOND, alive, Separation())
+    assert [pair[0] for pair, state in zip(over.told.pair.tolist(), over.state, strict=True) if state == "over"] == [1]
+    looked = probing.looking(T0 + 4 * SECOND, alive, Separation()).meeting(Separation())
+    probing, then = looked.watching(T0 + 4 * SECOND, alive, Separation())
+    assert [pair[0] for pair, state in zip(then.told.pair.tolist(), then.state, strict=True) if state == "found"] == [
+        51
+    ]
+
+
 def test_a_live_conflict_is_said_a_minute_ahead_shown_and_cleared() -> None:
     """Head-on, lost after 91 s: said within 20 s with both names, in the picture until it is over, which is said too."""
     pictures = run(flown(HEAD_ON, 120))
