@@ -36,8 +36,11 @@ LEARNS = 0.05  # of each position, for the scatter
 LASTS = 2.0  # how many positions in a row a source's error is the same for, about
 
 
-def judged(tip: Tip, place: Floats, late_s: Floats, settings: DeadReckoning) -> Tip:
-    """The tips with a position each (n, 9), see `told.PLACE`, told so long (n,) before; refused ones are not worked in."""
+def judged(tip: Tip, place: Floats, late_s: Floats, tells_walks: Bools, settings: DeadReckoning) -> Tip:
+    """The tips with a position each (n, 9), see `told.PLACE`, told so long (n,) before; refused ones are not worked in.
+
+    `tells_walks` (n,): whether what goes on without GPS may deny what walks off slowly.
+    """
     motion = tip.state.motion
     late = late_s[:, None, None]
     told = (place[:, None, column] for column in range(3))
@@ -49,7 +52,7 @@ def judged(tip: Tip, place: Floats, late_s: Floats, settings: DeadReckoning) -> 
     trusted = (tip.cell - tip.began >= TRUSTED_AFTER) & np.array(settings.refuses)
     jumps = trusted & (worst[:, 0] > FAR)
     old = tip.cell[:, None] - tip.seeded[:, 1:] >= OLD_ENOUGH
-    walks = trusted[:, None] & old & (worst[:, 1:] > WALKED)
+    walks = (trusted & tells_walks)[:, None] & old & (worst[:, 1:] > WALKED)
     refused = tip.denied != NOTHING
     agreed = np.where(refused & (worst[:, 0] < NEAR), tip.agreed + 1, 0)
     returns = refused & (agreed >= AGREES_FOR)

@@ -14,8 +14,8 @@ from gateway.estimators.dead_reckoning import Unit
 from gateway.estimators.inertial import Motion, displaced
 from gateway.reckon.cells import BLOCK, CELL_NS, CELL_S, SECOND_CELLS, Block, Cells
 from gateway.reckon.judging import judged
-from gateway.reckon.ties import Kinds, tied, with_altitude, with_picture
-from gateway.reckon.tip import HYPOTHESES, SEEDED_EVERY, Tip, hypothesis, joined, spread, with_hypothesis
+from gateway.reckon.ties import SLOWEST_AIR_MPS, Kinds, tied, with_altitude, with_picture
+from gateway.reckon.tip import HYPOTHESES, SEEDED_EVERY, Tip, hypothesis, joined, split_anew, spread, with_hypothesis
 from gateway.settings import DeadReckoning
 
 Floats = NDArray[np.float64]
@@ -101,11 +101,16 @@ def _through(tip: Tip, told: Block, kinds: Kinds, cell: int, unit: Unit, setting
     tip = with_altitude(tip, told, end, settings)
     has_place = np.flatnonzero(~np.isnan(told.place[:, 0]))
     if len(has_place):
-        some = judged(tip.taken(has_place), told.place[has_place], told.place_late[has_place], settings)
+        # of copters and boats what goes on without GPS is not sure enough: it denied good positions of real ones
+        tells_walks = (kinds.wings | kinds.wheels)[has_place]
+        some = judged(tip.taken(has_place), told.place[has_place], told.place_late[has_place], tells_walks, settings)
         tip = tip.put(has_place, some)
     is_pictured = np.flatnonzero(~np.isnan(told.pictured[:, 0]))
     if len(is_pictured):
         tip = tip.put(is_pictured, with_picture(tip.taken(is_pictured), told, is_pictured))
+    stands = np.flatnonzero(kinds.wings & (told.airspeed <= SLOWEST_AIR_MPS))
+    if len(stands):  # wheels and ground do what wings do not: what went on without GPS knows nothing of that
+        tip = tip.put(stands, split_anew(tip.taken(stands), end))
     if end % SEEDED_EVERY == 0:
         which = 1 + end // SEEDED_EVERY % (HYPOTHESES - 1)
         seeded = tip.seeded.copy()

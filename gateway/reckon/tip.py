@@ -7,7 +7,7 @@ turn, five seconds apart, and go on without. What walks off too slowly for the f
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -81,6 +81,11 @@ def with_each(do: Callable[..., NDArray[Any]], *states: Reckoning) -> Reckoning:
 def spread(state: Reckoning) -> Reckoning:
     """States (n, ...) as those of all hypotheses (n, HYPOTHESES, ...)."""
     return with_each(lambda one: np.repeat(one[:, None], HYPOTHESES, axis=1), state)
+
+
+def split_anew(tip: Tip, cell: int) -> Tip:
+    """The same with every hypothesis split off from the first one now."""
+    return replace(tip, state=spread(hypothesis(tip.state, 0)), seeded=np.full_like(tip.seeded, cell))
 
 
 def hypothesis(state: Reckoning, which: int) -> Reckoning:
