@@ -81,6 +81,7 @@ def viewer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ViewerClient]:
 
 
 PARTS = (0.25, 0.5, 0.75)
+LEAST_PIXELS = 20
 
 
 @pytest.fixture(scope="module")
@@ -157,11 +158,23 @@ def test_what_is_seen_is_not_empty_early_in_the_middle_and_late(viewer, session)
         state = viewer.get_state()
         assert [(view.name, view.reports) for view in state.views if view.reports] == []
         for view in state.views:
-            drawn = drawn_pixels(viewer, view)
+            drawn = painted_pixels(viewer, view)
             if drawn is not None:
                 seen.setdefault(view.name, []).append(drawn)
     assert {"Log", "Map", f"{DEMO_SITE.name}: approach"} < set(seen)
-    assert min(min(pixels) for pixels in seen.values()) >= 20, seen
+    assert min(min(pixels) for pixels in seen.values()) >= LEAST_PIXELS, seen
+
+
+def painted_pixels(viewer: ViewerClient, view: Any) -> int | None:
+    """The same once the view has been painted: on a busy machine that may take it more than one picture."""
+    last: list[int | None] = [None]
+
+    def painted() -> bool | None:
+        last[0] = drawn_pixels(viewer, view)
+        return None if last[0] is not None and last[0] < LEAST_PIXELS else True
+
+    until(painted, 10.0)
+    return last[0]
 
 
 def drawn_pixels(viewer: ViewerClient, view: Any) -> int | None:
