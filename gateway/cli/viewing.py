@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import signal
 import subprocess
 import sys
 from typing import Self
@@ -64,7 +66,9 @@ class Viewing:
 
     def __exit__(self, *left: object) -> None:
         if self._process is not None and self._viewer is Viewer.web:
-            self._process.terminate()
+            # the program that serves is a child of the one that was started: both are this session's
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGTERM)
             self._process.wait()
 
 
