@@ -21,7 +21,7 @@ from typing import Any
 
 from adapters.told_fields import HIGHEST_M, json_object, number, place_rad
 from gateway.observation import Intent, WeatherArea
-from gateway.settings import Weather
+from gateway.settings import Weather, encloses
 from gateway.settings.instants import instant_ns
 
 DECLARED = "declared"
@@ -140,7 +140,7 @@ def _corners(told: object) -> tuple[tuple[float, float], ...] | None:
         if place is None:
             return None
         found.append(place)
-    return tuple(found)
+    return tuple(found) if encloses(found) else None
 
 
 def _is_pair(told: object) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +48,7 @@ def areas(tellings: Tellings, site: Site, frame: RunwayFrame, at: int, separatio
             known.pop(name, None)
         else:
             known[name] = told.area
-    return tuple(_area(one, site, frame, separation_m) for one in known.values() if _holds(one, at))
+    return tuple(_area(one, frame, separation_m) for one in known.values() if _holds(one, at))
 
 
 def _holds(area: Weather, at: int) -> bool:
@@ -56,11 +57,14 @@ def _holds(area: Weather, at: int) -> bool:
     return (begins is None or begins <= at) and (ends is None or at < ends)
 
 
-def _area(area: Weather, site: Site, frame: RunwayFrame, separation_m: float) -> Area:
-    def height(above_sea_m: float | None, otherwise: float) -> float:
-        return otherwise if above_sea_m is None else above_sea_m + separation_m - site.runway.height_m
+@lru_cache(maxsize=256)
+def _area(area: Weather, frame: RunwayFrame, separation_m: float) -> Area:
+    """An area seldom changes, and is asked for in every round."""
+    ground = frame.runway.height_m
 
-    ground = site.runway.height_m
+    def height(above_sea_m: float | None, otherwise: float) -> float:
+        return otherwise if above_sea_m is None else above_sea_m + separation_m - ground
+
     if area.latitude_rad is not None and area.longitude_rad is not None:
         centre = frame.enu_from_geodetic(area.latitude_rad, area.longitude_rad, ground)[:2]
         angle = np.arange(CORNERS) * (2.0 * math.pi / CORNERS)
@@ -73,22 +77,10 @@ def _area(area: Weather, site: Site, frame: RunwayFrame, separation_m: float) ->
 
 
 def hull(points: Floats) -> Floats:
-    """The convex hull (k, 2), counter-clockwise, of points (n, 2)."""
-    ordered = sorted({(float(x), float(y)) for x, y in points.tolist()})
-    sides: list[list[tuple[float, float]]] = []
-    for run in (ordered, ordered[::-1]):
-        side: list[tuple[float, float]] = []
-        for x, y in run:
-            while len(side) > 1 and _left(side[-2], side[-1], (x, y)) <= 0.0:
-                side.pop()
-            side.append((x, y))
-        sides.append(side[:-1])
-    return np.array(sides[0] + sides[1])
+    """The convex hull (k, 2), counter-clockwise, of points (n, 2) that enclose an area."""
+    from scipy.spatial import ConvexHull
 
-
-def _left(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
-    """How far c is to the left of the line from a to b, times its length."""
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    return np.asarray(points[ConvexHull(points).vertices])
 
 
 def crosses(start: Floats, end: Floats, corners: Floats) -> Bools:

@@ -18,6 +18,7 @@ from gateway.settings.site import (
     Units,
     Waypoint,
     Weather,
+    encloses,
     with_radar,
 )
 from gateway.settings.writing import format_site
@@ -43,6 +44,7 @@ __all__ = [
     "Waypoint",
     "Weather",
     "Weighting",
+    "encloses",
     "format_site",
     "parse_site",
     "with_radar",

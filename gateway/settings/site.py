@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 from gateway.settings.safety import Separation, Stabilised
@@ -145,6 +147,18 @@ class Waypoint:
     name: str
     latitude_rad: float
     longitude_rad: float
+
+
+LEAST_AREA_RAD2 = 1e-13  # some four square metres
+
+
+def encloses(corners: Sequence[tuple[float, float]]) -> bool:
+    """Whether corners, latitude and longitude in rad, enclose an area: not all of them at one place, or on one line."""
+    (y, x), *others = corners
+    return any(
+        abs((one[1] - x) * (two[0] - y) - (one[0] - y) * (two[1] - x)) > LEAST_AREA_RAD2
+        for one, two in pairwise(others)
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gateway.settings.instants import instant_ns
+from gateway.settings.site import encloses
 
 Convert = Callable[[Any], Any]
 
@@ -60,7 +61,10 @@ def _polygon(value: Any) -> tuple[tuple[float, float], ...]:
         or not all(isinstance(corner, list) and len(corner) == 2 for corner in value)
     ):
         raise ValueError("must be a list of at least three [latitude, longitude] corners in degrees")
-    return tuple((_LATITUDE(latitude), _LONGITUDE(longitude)) for latitude, longitude in value)
+    corners = tuple((_LATITUDE(latitude), _LONGITUDE(longitude)) for latitude, longitude in value)
+    if not encloses(corners):
+        raise ValueError("must enclose an area, and its corners are at one place or on one line")
+    return corners
 
 
 def _instant(value: Any) -> str:
