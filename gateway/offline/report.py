@@ -18,14 +18,12 @@ from gateway.offline.touchdown import Touchdown, touchdown
 from gateway.offline.way import Flown, resampled
 from gateway.predict.approach import deviations
 from gateway.predict.gates import (
-    CLIMBS_MPS,
     KINDS,
-    ON_FINAL_RAD,
-    TOWARDS,
     Alert,
     alerts,
     excess,
     gate_heights,
+    on_final,
 )
 from gateway.settings import Site
 
@@ -108,8 +106,7 @@ def _course(site: Site, way: Flown) -> Course:
     """Where it is not on final, the deviations are NaN."""
     off = deviations(site.runway, way.place_m, way.velocity_mps[:, 0])
     speed = np.hypot(way.velocity_mps[:, 0], way.velocity_mps[:, 1])
-    on = (np.abs(off.lateral_rad) < ON_FINAL_RAD) & (way.velocity_mps[:, 0] > TOWARDS * speed)
-    on &= way.velocity_mps[:, 2] < CLIMBS_MPS
+    on = on_final(off, way.velocity_mps)
     distance, above, left = (np.where(on, one, math.nan) for one in (off.distance_m, off.vertical_m, off.lateral_m))
     return Course(way.time, distance, above, left, way.place_m[:, 2], speed, -way.velocity_mps[:, 2])
 

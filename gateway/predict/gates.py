@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gateway.align import SECOND
 from gateway.frames import RunwayFrame, turn
-from gateway.predict.approach import deviations
+from gateway.predict.approach import Deviations, deviations
 from gateway.settings import Runway, Stabilised
 
 Floats = NDArray[np.float64]
@@ -83,6 +83,15 @@ def excess(
     height = before_aim * math.tan(runway.glide_path_rad) + above
     judged = height <= gate_heights(limits, runway, wanted)[0]
     return Excess(np.where(judged[..., None], off, math.nan), np.where(judged[..., None], ratio, math.nan))
+
+
+def on_final(off: Deviations, velocity_mps: Floats) -> Bools:
+    """Who (n,) is on final, of deviations (n,) and velocities (n, 3) in the runway frame: near the centreline, flying at the
+    runway, and not going around.
+    """
+    along, left, up = np.moveaxis(velocity_mps, -1, 0)
+    towards = along > TOWARDS * np.sqrt(along * along + left * left)
+    return np.asarray((np.abs(off.lateral_rad) < ON_FINAL_RAD) & towards & (up < CLIMBS_MPS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,8 +195,7 @@ class Gates:
         place, flies = turn(frame.runway_from_enu, place_enu), turn(frame.runway_from_enu, velocity)
         off = deviations(frame.runway, place, flies[:, 0])
         speed = np.sqrt(velocity[:, 0] ** 2 + velocity[:, 1] ** 2)
-        on = np.isfinite(off.distance_m) & (np.abs(off.lateral_rad) < ON_FINAL_RAD) & has_height
-        on &= (flies[:, 0] > TOWARDS * speed) & (velocity[:, 2] < CLIMBS_MPS)
+        on = on_final(off, flies) & has_height
         rows = [row for row, track in enumerate(tracks) if on[row] or track in self.finals]
         if not rows:
             return self, None

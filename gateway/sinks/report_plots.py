@@ -55,9 +55,9 @@ def plot(
     marks: Sequence[Mark] = (),
 ) -> str:
     """One plot as an <svg> element. The x axis is what there is to go: it falls from left to right, as flights come."""
-    x_axis = _Axis.of([one.x for one in lines], _LEFT, WIDTH - _RIGHT, True)
+    x_axis = _Axis.of([one.x for one in lines], WIDTH - _RIGHT, _LEFT)
     values = [one.y for one in lines] + [side for one in bands for side in (one.low, one.high)]
-    y_axis = _Axis.of(values, _TOP, HEIGHT - _BOTTOM, True)
+    y_axis = _Axis.of(values, HEIGHT - _BOTTOM, _TOP)
     parts = [
         f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(title, True)}">',
         f'<text x="{_LEFT}" y="16" class="title">{escape(title)}</text>',
@@ -82,7 +82,8 @@ class _Axis:
     ticks: tuple[float, ...]
 
     @classmethod
-    def of(cls, values: Sequence[Floats], begins: float, ends: float, falls: bool) -> _Axis:
+    def of(cls, values: Sequence[Floats], begins: float, ends: float) -> _Axis:
+        """An axis for values, whose lowest is drawn at pixel `begins`."""
         known = np.concatenate([one[np.isfinite(one)] for one in values] or [np.zeros(1)])
         low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
         if high - low < 1e-6:
@@ -90,7 +91,7 @@ class _Axis:
         step = _round((high - low) / _TICKS)
         low, high = math.floor(low / step) * step, math.ceil(high / step) * step
         ticks = tuple(low + number * step for number in range(round((high - low) / step) + 1))
-        return cls(low, high, *((ends, begins) if falls else (begins, ends)), ticks)
+        return cls(low, high, begins, ends, ticks)
 
     def at(self, values: Floats | float) -> Floats:
         share = (np.asarray(values, dtype=np.float64) - self.low) / (self.high - self.low)
