@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 from scipy.spatial.distance import squareform
 
 from gateway.estimators.fuzzy import feature_points, fuzzy_means
@@ -39,6 +40,7 @@ CORRIDOR_M = (
 )
 ASIDE = 2.5  # times how near a flow's flights are to each other; who is further from all of them came alone
 _DENSE = 3  # flights, the flight itself too, within whose distance a way is a way that is flown
+_BESIDE = 50  # flights of a large flow that a flight is compared with
 _FINAL = 4  # last points of a track that tell its landing direction
 _THINNED = 400  # points of a track of which feature points are chosen
 _FASTEST_MPS, _STEEPEST_MPS = 400.0, 60.0  # nothing that arrives is faster: a point that would have to be is damage
@@ -157,15 +159,18 @@ def _by_shape(places: Floats, least_flights: int) -> Integers:
 def _aside(ground: Floats, labels: Integers) -> Floats:
     """RMS over each way (n, POINTS, 2) of the distance to the nearest other way of its flow (n,), m; NaN without a flow.
 
-    Another flight may be the nearest at each point: who is vectored leaves the way of one for that of another.
+    Another flight may be the nearest at each point: who is vectored leaves the way of one for that of another. Of a large
+    flow the `_BESIDE` most alike are looked at, so that its cost does not grow with the square of its flights.
     """
     aside_m = np.full(len(ground), math.nan)
     for number in range(int(labels.max(initial=OUTLIER)) + 1):
         flights = np.flatnonzero(labels == number)
         begins, steps = ground[flights, :-1], np.diff(ground[flights], axis=1)
         lengths = np.maximum(np.sum(steps**2, axis=-1), 1e-9)
+        whole = ground[flights].reshape(len(flights), -1)
+        _, alike = KDTree(whole).query(whole, k=min(len(flights), 1 + _BESIDE))
         for place, flight in enumerate(flights.tolist()):
-            others = np.arange(len(flights)) != place
+            others = np.sort(alike[place][alike[place] != place])
             to = ground[flight][:, None, None] - begins[others]
             share = np.clip(np.sum(to * steps[others], axis=-1) / lengths[others], 0.0, 1.0)
             off = np.sum((to - share[..., None] * steps[others]) ** 2, axis=-1)
