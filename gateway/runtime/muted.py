@@ -7,6 +7,7 @@ muted positions between which they lie.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -97,27 +98,15 @@ class Muted:
             if one.aircraft in self._episodes:
                 sigmas = float(one.sigma_m[0]), float(one.sigma_m[1])
                 self._wait(one.aircraft, "dead reckoning", one.at, one.latitude_rad, one.longitude_rad, sigmas)
-                self._wait_for_constant(one.aircraft, one.at)
 
     def _wait(
         self, aircraft: str, what: str, at: int, latitude: float, longitude: float, sigmas: tuple[float, float]
     ) -> None:
         one = self._episodes[aircraft][-1]
-        if one.begins_at <= at:
+        if one.begins_at <= at <= one.times[-1] + ANEW_NS:  # what comes after it has ended waits for nothing
             one.waiting[what, at] = (float(latitude), float(longitude), *sigmas)
-            if what == "track":
-                self._wait_for_constant(aircraft, at)
-
-    def _wait_for_constant(self, aircraft: str, at: int) -> None:
-        one = self._episodes[aircraft][-1]
-        known = one.known
-        if known is None or known.velocity_north_mps is None or known.velocity_east_mps is None or at < one.begins_at:
-            return
-        elapsed_s = (at - known.valid_at) / SECOND
-        metres = np.array([known.velocity_north_mps * elapsed_s, known.velocity_east_mps * elapsed_s, 0.0])
-        place = np.array(known.latitude_rad), np.array(known.longitude_rad), np.zeros(())
-        latitude, longitude, _ = displaced(*place, metres)
-        one.waiting["constant velocity", at] = float(latitude), float(longitude), math.nan, math.nan
+            if ("constant velocity", at) not in one.waiting:
+                _wait_for_constant(one, at)
 
     def scores(self) -> tuple[MutedScore, ...]:
         """One of each thing for each aircraft and time without positions, in their order."""
@@ -131,20 +120,31 @@ class Muted:
         return tuple(made)
 
 
+def _wait_for_constant(one: _Episode, at: int) -> None:
+    known = one.known
+    if known is None or known.velocity_north_mps is None or known.velocity_east_mps is None:
+        return
+    elapsed_s = (at - known.valid_at) / SECOND
+    metres = np.array([known.velocity_north_mps * elapsed_s, known.velocity_east_mps * elapsed_s, 0.0])
+    place = np.array(known.latitude_rad), np.array(known.longitude_rad), np.zeros(())
+    latitude, longitude, _ = displaced(*place, metres)
+    one.waiting["constant velocity", at] = float(latitude), float(longitude), math.nan, math.nan
+
+
 def _settled(aircraft: str, one: _Episode) -> list[MutedError]:
     """The errors of what the muted positions have caught up with; the last word for each time counts."""
     ready = sorted(key for key in one.waiting if key[1] <= one.times[-1])
     if not ready or len(one.times) < 2:
         return []
-    times = np.array(one.times)
+    times = one.times
     found = []
     for what, at in ready:
         latitude, longitude, north_m, east_m = one.waiting.pop((what, at))
-        after = min(max(int(np.searchsorted(times, at)), 1), len(times) - 1)
-        gap = int(times[after] - times[after - 1])
+        after = min(max(bisect_left(times, at), 1), len(times) - 1)
+        gap = times[after] - times[after - 1]
         if gap > GAP_NS:
             continue
-        share = (at - int(times[after - 1])) / gap
+        share = (at - times[after - 1]) / gap
         before, later = np.array(one.places[after - 1]), np.array(one.places[after])
         true = before + share * (later - before)
         off = _metres(true, latitude, longitude)
