@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -83,3 +84,13 @@ def test_what_something_else_has_bounded_is_bounded_here_too() -> None:
     weight = begin(state, modes).weight
     error = actual_error.corrected(state.covariance, weight, told, state.mean[:, None], reckoned[:, None])
     assert (error == reckoned).all()
+
+
+def test_a_prediction_counts_the_modes_as_they_were_before_they_mixed() -> None:
+    """What mixing gives a mode speaks for nothing: a turn that nothing speaks for is not counted ten seconds on either."""
+    state = kalman.start(np.zeros((1, 3)), 900.0 * np.eye(3)[None], np.full((1, 3), 50.0), np.ones(1), 0.0)
+    mixture = replace(begin(state, MODES), weight=np.array([[0.899, 0.1, 5e-4, 5e-4]]))
+    ahead = predict(mixture, np.array([10.0]), MODES)
+    assert ahead.weight[0, 2] > 0.05
+    assert ahead.counted == pytest.approx(actual_error.counted(mixture.weight, MODES.shares))
+    assert ahead.counted[0, 2] < 1e-5
