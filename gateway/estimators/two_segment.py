@@ -103,12 +103,8 @@ def ahead(
     not follow.
     """
     n = len(now.position)
-    speed = np.sqrt(now.velocity[:, 0] * now.velocity[:, 0] + now.velocity[:, 1] * now.velocity[:, 1])
-    course = np.arctan2(now.velocity[:, 1], now.velocity[:, 0])
     calm = np.zeros((n, 2)) if wind is None or rule == "literal" else wind
-    air = np.sqrt(((now.velocity - calm) ** 2).sum(axis=1)) if air_speed is None else air_speed
-    if air_speed is not None:
-        speed = ground_speed(course, air, calm)
+    course, speed, air = _as_now(now, calm, air_speed)
     path = Path.at_start(now.position, course, np.broadcast_to(horizons_s, (n, np.shape(horizons_s)[-1])))
     if rule == "literal":
         route = route[:, :1]
@@ -144,6 +140,15 @@ def ahead(
     if not follows.all():
         on.extend(speed, now.turn_rate, np.zeros(n), 0)
     return _either(path, on, slower_from, follows)
+
+
+def _as_now(now: Moving, wind: Floats, air_speed: Floats | None) -> tuple[Floats, Floats, Floats]:
+    """Courses, ground speeds and speeds through the air (n,); where that is told, the ground speed is what it makes."""
+    course = np.arctan2(now.velocity[:, 1], now.velocity[:, 0])
+    if air_speed is not None:
+        return course, ground_speed(course, air_speed, wind), air_speed
+    speed = np.sqrt(now.velocity[:, 0] * now.velocity[:, 0] + now.velocity[:, 1] * now.velocity[:, 1])
+    return course, speed, np.sqrt(((now.velocity - wind) ** 2).sum(axis=1))
 
 
 def _either(path: Path, on: Path, slower_from: Floats, follows: Bools) -> Ahead:
