@@ -46,15 +46,10 @@ class Excess:
 def gate_heights(limits: Stabilised, runway: Runway, approach_mps: ArrayLike) -> tuple[Floats, Floats]:
     """The upper and the lower gate (n,), m above the runway, of who approaches at speeds (n,)."""
     sinks = np.asarray(approach_mps, dtype=np.float64) * math.tan(runway.glide_path_rad)
-    upper = (
-        np.minimum(UPPER_S * sinks, UPPER_M)
-        if limits.upper_gate_m is None
-        else np.full_like(sinks, limits.upper_gate_m)
-    )
-    lower = (
-        np.minimum(LOWER_S * sinks, LOWER_M)
-        if limits.lower_gate_m is None
-        else np.full_like(sinks, limits.lower_gate_m)
+    given = ((UPPER_S, UPPER_M, limits.upper_gate_m), (LOWER_S, LOWER_M, limits.lower_gate_m))
+    upper, lower = (
+        np.minimum(time_s * sinks, most_m) if gate_m is None else np.full_like(sinks, gate_m)
+        for time_s, most_m, gate_m in given
     )
     return upper, lower
 

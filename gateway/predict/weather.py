@@ -77,10 +77,24 @@ def _area(area: Weather, frame: RunwayFrame, separation_m: float) -> Area:
 
 
 def hull(points: Floats) -> Floats:
-    """The convex hull (k, 2), counter-clockwise, of points (n, 2) that enclose an area."""
-    from scipy.spatial import ConvexHull
+    """The convex hull (k, 2), counter-clockwise, of points (n, 2) that enclose an area. Andrew's monotone chain: SciPy, whose
+    hull it could be, is not loaded while a session runs.
+    """
+    ordered = sorted({(float(x), float(y)) for x, y in points.tolist()})
+    sides: list[list[tuple[float, float]]] = []
+    for run in (ordered, ordered[::-1]):
+        side: list[tuple[float, float]] = []
+        for x, y in run:
+            while len(side) > 1 and _left(side[-2], side[-1], (x, y)) <= 0.0:
+                side.pop()
+            side.append((x, y))
+        sides.append(side[:-1])
+    return np.array(sides[0] + sides[1])
 
-    return np.asarray(points[ConvexHull(points).vertices])
+
+def _left(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    """How far c is to the left of the line from a to b, times its length."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def crosses(start: Floats, end: Floats, corners: Floats) -> Bools:
