@@ -29,7 +29,7 @@ _VERSION = "110"
 _COLUMNS = 12
 _PX4 = 12  # numbers its items from 0, the others from 1: there 0 is home
 _GLOBAL, _ABOVE_HOME = 0, 3
-_LOITER_TO_ALTITUDE, _LAND = 31, 21
+_WAYPOINT, _LOITER_TO_ALTITUDE, _LAND = 16, 31, 21
 _LARGEST_BYTES = 16 << 20
 
 
@@ -43,6 +43,7 @@ class _Item(NamedTuple):
     command: int
     frame: int
     place: tuple[float, float, float]
+    parameters: tuple[float, float, float] = (math.nan, math.nan, math.nan)  # the first three
 
 
 def mission_kind(beginning: bytes) -> MissionKind | None:
@@ -68,14 +69,14 @@ def read_mission(path: Path) -> tuple[PlanPoint, ...]:
         raise MissionFileError(f"{path} is no mission file: neither QGroundControl's .plan nor QGC WPL 110.")
     text = content.decode("utf-8-sig", "replace")
     items, home = _of_plan(path, text) if kind == "plan" else _of_lines(path, text)
-    points = [point for item in items if (point := plan_point(*item[1:4], *item.place)) is not None]
+    points = [point for item in items if (point := plan_point(*item[1:4], *item.place, item.parameters)) is not None]
     if not points:
         raise MissionFileError(f"{path} holds no item that is a place to fly to.")
     return (*home, *points)
 
 
 def _home(place: tuple[float, float, float]) -> tuple[PlanPoint, ...]:
-    found = plan_point(0, 16, _GLOBAL, *place)
+    found = plan_point(0, _WAYPOINT, _GLOBAL, *place)
     if found is None:
         return ()
     return (PlanPoint(0, "home", found.latitude_rad, found.longitude_rad, altitude_msl_m=found.altitude_msl_m),)
@@ -100,7 +101,8 @@ def _of_lines(path: Path, text: str) -> tuple[list[_Item], tuple[PlanPoint, ...]
         if sequence == 0:
             home = _home(place)
         else:
-            items.append(_Item(where, sequence, command, frame, place))
+            given = (_number(words[4], where), _number(words[5], where), _number(words[6], where))
+            items.append(_Item(where, sequence, command, frame, place, given))
     return items, home
 
 
@@ -131,7 +133,8 @@ def _plan_items(item: Any, sequence: int, where: str) -> Iterator[_Item]:
         if len(params) != 7:
             raise MissionFileError(f"{where}: params has {len(params)} values, a SimpleItem has 7.")
         command, frame = (_whole(item.get(name), f"{where}, {name}") for name in ("command", "frame"))
-        yield _Item(where, sequence, command, frame, _place(params[4:], f"{where}, params"))
+        given = (_number(params[0], where), _number(params[1], where), _number(params[2], where))
+        yield _Item(where, sequence, command, frame, _place(params[4:], f"{where}, params"), given)
     elif kind == "ComplexItem":
         yield from _complex_items(item, sequence, where)
     else:
@@ -149,11 +152,18 @@ def _complex_items(item: dict[str, Any], sequence: int, where: str) -> Iterator[
         approach = item.get("landingApproachCoordinate", item.get("loiterCoordinate"))
         yield _Item(where, sequence, 189, frame, (math.nan, math.nan, math.nan))  # DO_LAND_START
         place = _place(approach, f"{where}, landingApproachCoordinate")
-        yield _Item(where, sequence + 1, _LOITER_TO_ALTITUDE, frame, place)
+        command = _LOITER_TO_ALTITUDE if item.get("useLoiterToAlt", True) else _WAYPOINT
+        yield _Item(where, sequence + 1, command, frame, place, (math.nan, _radius(item, where), math.nan))
         yield _Item(where, sequence + 2, _LAND, frame, _place(item["landCoordinate"], f"{where}, landCoordinate"))
     else:
         kind = item.get("complexItemType")
         raise MissionFileError(f"{where}: a ComplexItem of type {kind!r} is not known; only surveys and landings are.")
+
+
+def _radius(landing: dict[str, Any], where: str) -> float:
+    """Of the circle in which the height of a landing pattern is reached, positive to the right; NaN = not known."""
+    radius = abs(_number(landing.get("loiterRadius"), where))
+    return radius if landing.get("loiterClockwise", True) else -radius
 
 
 def _part(whole: Any, name: str, kind: type, where: str) -> Any:

@@ -3,8 +3,8 @@
     {"told": "plan", "aircraft": "mavlink:1", "points": [
         {"sequence": 1, "kind": "waypoint", "latitude_deg": 31.0, "longitude_deg": 104.0, "altitude_above_home_m": 50.0}, ...]}
 
-A point has an altitude above mean sea level (`altitude_msl_m`) or above home, or none. Aircraft "*", or none: the first
-vehicle that is heard.
+A point has an altitude above mean sea level (`altitude_msl_m`) or above home, or none; a loiter may have a `radius_m`, positive
+to the right, and how many `turns` are flown at least. Aircraft "*", or none: the first vehicle that is heard.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ Observations = tuple[Observation, ...]
 
 ANYBODY = "*"
 LONGEST_LINE = 4_000_000
+LEAST_RADIUS_M = 1.0
+_REALS = ("altitude_msl_m", "altitude_above_home_m", "radius_m", "turns")  # in the order in which a point has them
 _KINDS = frozenset(("home", "waypoint", "loiter", "take-off", "landing", "other"))
 
 
@@ -62,11 +64,8 @@ def _plain(point: PlanPoint) -> dict[str, Any]:
         "latitude_deg": math.degrees(point.latitude_rad),
         "longitude_deg": math.degrees(point.longitude_rad),
     }
-    if point.altitude_msl_m is not None:
-        plain["altitude_msl_m"] = point.altitude_msl_m
-    if point.altitude_above_home_m is not None:
-        plain["altitude_above_home_m"] = point.altitude_above_home_m
-    return plain
+    given = {name: getattr(point, name) for name in _REALS}
+    return plain | {name: value for name, value in given.items() if value is not None}
 
 
 def _point(told: object) -> PlanPoint | None:
@@ -77,14 +76,10 @@ def _point(told: object) -> PlanPoint | None:
         return None
     if place is None:
         return None
-    altitudes = []
-    for name in ("altitude_msl_m", "altitude_above_home_m"):
-        given = told.get(name)
-        altitude = None if given is None else number(given, HIGHEST_M)
-        if given is not None and altitude is None:
-            return None
-        altitudes.append(altitude)
-    return PlanPoint(sequence, kind, *place, *altitudes)
+    reals = {name: number(told[name], HIGHEST_M) for name in _REALS if told.get(name) is not None}
+    if None in reals.values() or abs(reals.get("radius_m") or LEAST_RADIUS_M) < LEAST_RADIUS_M:
+        return None
+    return PlanPoint(sequence, kind, *place, *[reals.get(name) for name in _REALS])
 
 
 class ToldPlans:

@@ -70,6 +70,34 @@ def test_a_plan_gives_home_simple_items_a_surveys_own_and_a_landing(tmp_path: Pa
     ]
 
 
+def test_circles_keep_their_radius_and_turns(tmp_path: Path) -> None:
+    """Of waypoint files, of a plan's items, and of a landing pattern, whose height may also be left straight on."""
+    path = tmp_path / "mission"
+    circle = {"type": "SimpleItem", "command": 18, "frame": 3, "params": [2, 0, -150, None, 1.0, 2.0, 60.0]}
+    landing = {"type": "ComplexItem", "complexItemType": "fwLandingPattern", "loiterRadius": 75.0}
+    landing |= {"landingApproachCoordinate": [1.3, 2.0, 40.0], "landCoordinate": [1.4, 2.0, 0.0]}
+    left, straight = {**landing, "loiterClockwise": False}, {**landing, "useLoiterToAlt": False}
+    line = "1\t0\t3\t18\t1.5\t0\t220\t0\t-35.36\t149.165\t50\t1\n"
+    told = {}
+    for name, text in {
+        "lines": f"QGC WPL 110\n{line}",
+        "circle": plan(circle),
+        "landing": plan(landing),
+        "left": plan(left),
+        "straight": plan(straight),
+    }.items():
+        path.write_text(text)
+        first = read_mission(path)[0]
+        told[name] = (first.kind, first.radius_m, first.turns)
+    assert told == {
+        "lines": ("loiter", 220.0, 1.5),
+        "circle": ("loiter", -150.0, 2.0),
+        "landing": ("loiter", 75.0, None),
+        "left": ("loiter", -75.0, None),
+        "straight": ("waypoint", None, None),
+    }
+
+
 def test_px4_numbers_its_items_from_zero(tmp_path: Path) -> None:
     text = plan(simple(22, 0.9, 2.0, 30.0), simple(16, 1.0, 2.0, 60.0), firmwareType=12)
     assert [row[:2] for row in read(tmp_path, text)] == [(0, "take-off"), (1, "waypoint")]
@@ -84,6 +112,7 @@ def test_px4_numbers_its_items_from_zero(tmp_path: Path) -> None:
         (WAYPOINTS.replace("2\t0\t0\t16", "2\t0\t0\t1.5"), "line 4: '1.5' is not a whole number"),
         ("QGC WPL 110\n", "no item that is a place"),
         (plan(simple(16, 1.0, 2.0, 3.0))[:-3] + ",,", "is not JSON"),
+        (WAYPOINTS.replace("22\t15", "22\tup"), "line 3: 'up' is not a number"),
         (plan(simple(16, 1.0, 2.0)), "item 1: params has 6 values"),
         (plan(simple(16, 1.0, 2.0, 3.0), {"type": "SimpleItem"}), "item 2: params is missing"),
         (plan({"type": "ComplexItem", "complexItemType": "StructureScan"}), "type 'StructureScan'"),

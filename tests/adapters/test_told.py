@@ -20,6 +20,7 @@ TOLD, LINK = Source(0, "told", "commands", "field.plan"), Source(1, "mavlink", "
 POINTS = (
     PlanPoint(1, "take-off", math.radians(31.0), math.radians(104.0), altitude_above_home_m=20.0),
     PlanPoint(2, "waypoint", math.radians(31.1), math.radians(104.1), altitude_msl_m=600.0),
+    PlanPoint(4, "loiter", math.radians(31.1), math.radians(104.2), radius_m=-150.0, turns=1.5),
     PlanPoint(5, "landing", math.radians(31.0), math.radians(104.0)),
 )
 
@@ -33,14 +34,20 @@ def test_a_plan_that_is_told_is_read_as_it_was_written() -> None:
     assert plan is not None
     assert plan.aircraft == "mavlink:1"
     assert [(one.sequence, one.kind, one.altitude_msl_m, one.altitude_above_home_m) for one in plan.points] == [
-        (1, "take-off", None, 20.0), (2, "waypoint", 600.0, None), (5, "landing", None, None),
+        (1, "take-off", None, 20.0), (2, "waypoint", 600.0, None), (4, "loiter", None, None), (5, "landing", None, None),
     ]  # fmt: skip
+    assert [(one.radius_m, one.turns) for one in plan.points] == [
+        (None, None),
+        (None, None),
+        (-150.0, 1.5),
+        (None, None),
+    ]
     assert plan.points[1].latitude_rad == pytest.approx(math.radians(31.1), abs=1e-15)
 
 
 def test_a_told_plan_of_a_named_aircraft_is_heard_at_once() -> None:
     (plan,) = _plans(Decoder([TOLD]).feed(Arrival(T0, 0, encode_plan("mavlink:2", POINTS))).observations)
-    assert (plan.aircraft, len(plan.points), plan.valid_at) == ("mavlink:2", 3, T0)
+    assert (plan.aircraft, len(plan.points), plan.valid_at) == ("mavlink:2", 4, T0)
 
 
 def test_a_told_plan_of_nobody_in_particular_is_the_first_vehicles_once_there_is_one() -> None:
@@ -61,7 +68,7 @@ def test_a_home_that_is_heard_joins_the_told_plan_and_does_not_replace_it() -> N
                         **dict.fromkeys(("x", "y", "z", "approach_x", "approach_y", "approach_z"), 0.0),
                         q=[1.0, 0, 0, 0])  # fmt: skip
     (plan,) = _plans(decoder.feed(Arrival(T0 + SECOND, 1, home)).observations)
-    assert [one.kind for one in plan.points] == ["home", "take-off", "waypoint", "landing"]
+    assert [one.kind for one in plan.points] == ["home", "take-off", "waypoint", "loiter", "landing"]
 
 
 @pytest.mark.parametrize(
@@ -76,6 +83,7 @@ def test_a_home_that_is_heard_joins_the_told_plan_and_does_not_replace_it() -> N
         {"points": [{"sequence": 1, "kind": ["waypoint"], "latitude_deg": 31.0, "longitude_deg": 0.0}]},
         {"points": [{"sequence": 1, "latitude_deg": math.nan, "longitude_deg": 0.0}]},
         {"points": [{"sequence": 1, "latitude_deg": 1.0, "longitude_deg": 0.0, "altitude_msl_m": "high"}]},
+        {"points": [{"sequence": 1, "latitude_deg": 1.0, "longitude_deg": 0.0, "radius_m": "wide"}]},
         {"points": [{"sequence": 1, "latitude_deg": 1.0, "longitude_deg": 0.0}] * 2},
     ],
 )
