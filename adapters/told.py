@@ -77,7 +77,8 @@ def _point(told: object) -> PlanPoint | None:
     if place is None:
         return None
     reals = {name: number(told[name], HIGHEST_M) for name in _REALS if told.get(name) is not None}
-    if None in reals.values() or abs(reals.get("radius_m") or LEAST_RADIUS_M) < LEAST_RADIUS_M:
+    radius = reals.get("radius_m")
+    if None in reals.values() or (radius is not None and abs(radius) < LEAST_RADIUS_M):
         return None
     return PlanPoint(sequence, kind, *place, *[reals.get(name) for name in _REALS])
 

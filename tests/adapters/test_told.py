@@ -83,7 +83,7 @@ def test_a_home_that_is_heard_joins_the_told_plan_and_does_not_replace_it() -> N
         {"points": [{"sequence": 1, "kind": ["waypoint"], "latitude_deg": 31.0, "longitude_deg": 0.0}]},
         {"points": [{"sequence": 1, "latitude_deg": math.nan, "longitude_deg": 0.0}]},
         {"points": [{"sequence": 1, "latitude_deg": 1.0, "longitude_deg": 0.0, "altitude_msl_m": "high"}]},
-        {"points": [{"sequence": 1, "latitude_deg": 1.0, "longitude_deg": 0.0, "radius_m": "wide"}]},
+        {"points": [{"sequence": 1, "latitude_deg": 1.0, "longitude_deg": 0.0, "radius_m": 0.0}]},
         {"points": [{"sequence": 1, "latitude_deg": 1.0, "longitude_deg": 0.0}] * 2},
     ],
 )
