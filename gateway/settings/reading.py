@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from gateway.settings.safety import Separation, Stabilised
@@ -42,20 +42,26 @@ def parse_site(text: str, name: str = "site file") -> Site:
 
     Raises SiteError: one sentence with the file's name and the line.
     """
-    document = read_toml(text, name)
-    for key in document:
-        if key != "name" and key not in TABLES:
-            raise SiteError(
-                f"{name}{_line_of(text, key)}: unknown {_kind(document[key])} {key!r}{_hint(key, ['name', *TABLES])}."
-            )
+    return read_site(read_toml(text, name), text, name)
+
+
+def read_site(document: Mapping[str, Any], text: str, name: str, within: str = "") -> Site:
+    """The site of a document that was read from a text; its tables are called `within` and their own names there.
+
+    Raises SiteError.
+    """
+    check_tables(document, ("name", *TABLES), text, name, within)
     title = document.get("name", "unnamed site")
     if not isinstance(title, str):
-        raise SiteError(f"{name}{_line_of(text, 'name')}: name must be a text in quotes, not {title!r}.")
+        raise SiteError(
+            f"{name}{line_of(text, 'name', within[:-1] or None)}: name must be a text in quotes, not {title!r}."
+        )
     if "runway" not in document:
-        raise SiteError(f"{name}: the table [runway] is missing; it needs {', '.join(TABLES['runway'].required)}.")
+        needs = ", ".join(TABLES["runway"].required)
+        raise SiteError(f"{name}: the table [{within}runway] is missing; it needs {needs}.")
 
     def rows(table: str) -> list[dict[str, Any]]:
-        return read_table(document, table, TABLES[table], text, name)
+        return read_table(document, table, TABLES[table], text, name, within)
 
     runway = Runway(**rows("runway")[0])
     against = runway.landing_compass_rad + math.pi
@@ -63,7 +69,7 @@ def parse_site(text: str, name: str = "site file") -> Site:
     numbers = [radar.number for radar in radars]
     if len(set(numbers)) != len(numbers):
         twice = next(number for number in numbers if numbers.count(number) > 1)
-        raise SiteError(f"{name}: two [[radar]] tables have the number {twice}; give each its own.")
+        raise SiteError(f"{name}: two [[{within}radar]] tables have the number {twice}; give each its own.")
     return Site(
         name=title,
         runway=runway,
@@ -75,14 +81,23 @@ def parse_site(text: str, name: str = "site file") -> Site:
         radars=radars,
         decision_points=tuple(DecisionPoint(**row) for row in rows("decision_point")),
         waypoints=tuple(Waypoint(**row) for row in rows("waypoint")),
-        weather=read_weather(document, text, name),
+        weather=read_weather(document, text, name, within),
         units=(rows("display") or [{}])[0].get("units", "si"),
     )
 
 
-def read_weather(document: Mapping[str, Any], text: str, name: str) -> tuple[Weather, ...]:
+def check_tables(document: Mapping[str, Any], known: Iterable[str], text: str, name: str, within: str = "") -> None:
+    """Raises SiteError for a table, or a key outside of all tables, that is not known."""
+    for key in document:
+        if key not in known:
+            where = f"{name}{line_of(text, f'{within}{key}')}"
+            raise SiteError(f"{where}: unknown {_kind(document[key])} {f'{within}{key}'!r}{hint(key, list(known))}.")
+
+
+def read_weather(document: Mapping[str, Any], text: str, name: str, within: str = "") -> tuple[Weather, ...]:
     """The areas of a document that was read from a text. Raises SiteError."""
-    return tuple(_weather(row, name) for row in read_table(document, "weather", TABLES["weather"], text, name))
+    rows = read_table(document, "weather", TABLES["weather"], text, name, within)
+    return tuple(_weather(row, name) for row in rows)
 
 
 def _weather(row: dict[str, Any], name: str) -> Weather:
@@ -94,40 +109,48 @@ def _weather(row: dict[str, Any], name: str) -> Weather:
     return Weather(**row)
 
 
-def read_table(document: Mapping[str, Any], table: str, shape: Table, text: str, name: str) -> list[dict[str, Any]]:
+def read_table(
+    document: Mapping[str, Any], table: str, shape: Table, text: str, name: str, within: str = ""
+) -> list[dict[str, Any]]:
     """Every occurrence of one table with its keys checked and converted to the dataclass's fields. Raises SiteError."""
-    label = f"[[{table}]]" if shape.many else f"[{table}]"
+    full = f"{within}{table}"
+    label = f"[[{full}]]" if shape.many else f"[{full}]"
     content = document.get(table, [] if shape.many else None)
     if content is None:
         return []
     if isinstance(content, list) != shape.many or not all(
         isinstance(row, dict) for row in (content if shape.many else [content])
     ):
-        raise SiteError(f"{name}{_line_of(text, table)}: write {table} as a table, {label}.")
-    read: list[dict[str, Any]] = []
-    for index, row in enumerate(content if shape.many else [content]):
-        fields: dict[str, Any] = {}
-        for key, value in row.items():
-            where = f"{name}{_line_of(text, key, table, index)}"
-            if key not in shape.keys:
-                raise SiteError(f"{where}: unknown key {key!r} in {label}{_hint(key, list(shape.keys))}.")
-            field_name, convert = shape.keys[key]
-            try:
-                fields[field_name] = convert(value)
-            except ValueError as error:
-                raise SiteError(f"{where}: {key} {error}.") from error
-        missing = [key for key in shape.required if key not in row]
-        if missing:
-            raise SiteError(f"{name}{_line_of(text, '', table, index)}: {label} lacks {' and '.join(missing)}.")
-        read.append(fields)
-    return read
+        raise SiteError(f"{name}{line_of(text, full)}: write {full} as a table, {label}.")
+
+    def read(index: int, row: Mapping[str, Any]) -> dict[str, Any]:
+        return read_row(row, shape, label, lambda key: f"{name}{line_of(text, key, full, index)}")
+
+    return [read(index, row) for index, row in enumerate(content if shape.many else [content])]
+
+
+def read_row(row: Mapping[str, Any], shape: Table, label: str, where: Callable[[str], str]) -> dict[str, Any]:
+    """One table's keys checked and converted; `where` says the place of a key ("": of the table). Raises SiteError."""
+    fields: dict[str, Any] = {}
+    for key, value in row.items():
+        if key not in shape.keys:
+            raise SiteError(f"{where(key)}: unknown key {key!r} in {label}{hint(key, list(shape.keys))}.")
+        field_name, convert = shape.keys[key]
+        try:
+            fields[field_name] = convert(value)
+        except ValueError as error:
+            raise SiteError(f"{where(key)}: {key} {error}.") from error
+    missing = [key for key in shape.required if key not in row]
+    if missing:
+        raise SiteError(f"{where('')}: {label} lacks {' and '.join(missing)}.")
+    return fields
 
 
 def _kind(value: object) -> str:
     return "table" if isinstance(value, dict | list) else "key"
 
 
-def _hint(key: str, known: list[str]) -> str:
+def hint(key: str, known: list[str]) -> str:
     """What the writer may have meant: the same quantity in another unit, or a near spelling."""
     stem = re.sub(r"_(deg|rad|m|km|ft|nm|mps|kn|mps2|degps|g|s|ms)$", "", key)
     same = [name for name in known if re.sub(r"_(deg|rad|m|mps|mps2|degps|s|ms)$", "", name) == stem]
@@ -139,12 +162,12 @@ def _hint(key: str, known: list[str]) -> str:
     return f"; perhaps {near[0]} is meant" if near else f"; known are {', '.join(known)}"
 
 
-def _line_of(text: str, key: str, table: str | None = None, index: int = 0) -> str:
+def line_of(text: str, key: str, table: str | None = None, index: int = 0) -> str:
     """', line N' of a key (or, with an empty key, of the table's own header), '' where it cannot be found."""
     current: str | None = None
     seen: dict[str, int] = {}
     for number, line in enumerate(text.splitlines(), 1):
-        header = re.match(r"\s*\[\[?\s*([\w-]+)\s*\]\]?", line)
+        header = re.match(r"\s*\[\[?\s*([\w.-]+)\s*\]\]?", line)
         if header:
             current = header.group(1)
             seen[current] = seen.get(current, -1) + 1

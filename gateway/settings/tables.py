@@ -26,7 +26,9 @@ def number(low: float = -math.inf, high: float = math.inf, *, scale: float = 1.0
     return convert
 
 
-def _whole(low: int, high: int) -> Convert:
+def whole(low: int, high: int) -> Convert:
+    """A whole number between two bounds."""
+
     def convert(value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not (low <= value <= high):
             raise ValueError(f"must be a whole number from {low} to {high}, not {value!r}")
@@ -48,7 +50,8 @@ def text(*allowed: str) -> Convert:
     return convert
 
 
-def _flag(value: Any) -> bool:
+def flag(value: Any) -> bool:
+    """True or false."""
     if not isinstance(value, bool):
         raise ValueError(f"must be true or false, not {value!r}")
     return value
@@ -67,7 +70,8 @@ def _polygon(value: Any) -> tuple[tuple[float, float], ...]:
     return corners
 
 
-def _instant(value: Any) -> str:
+def instant(value: Any) -> str:
+    """A time, ISO 8601, UTC without a zone."""
     said = value if isinstance(value, str) else getattr(value, "isoformat", str)()
     if instant_ns(str(said)) is None:
         raise ValueError(f"must be a time such as 2026-03-01T12:00:00Z, not {value!r}")
@@ -172,12 +176,12 @@ TABLES: dict[str, Table] = {
             "slip_mps": ("slip_mps", number(0.001, 10.0)),
             "altitude_sigma_m": ("altitude_sigma_m", number(0.1, 1000.0)),
             "ends_at_sigma_m": ("ends_at_sigma_m", number(1.0, 1e5)),
-            "refuses": ("refuses", _flag),
+            "refuses": ("refuses", flag),
         }
     ),
     "radar": Table(
         {
-            "number": ("number", _whole(1, 65535)),
+            "number": ("number", whole(1, 65535)),
             "along_m": ("along_m", _FINITE),
             "left_m": ("left_m", _FINITE),
             "antenna_height_m": ("antenna_height_m", number(-1000.0, 1000.0)),
@@ -196,7 +200,7 @@ TABLES: dict[str, Table] = {
             "clutter_per_scan": ("clutter_per_scan", number(0.0, 1e5)),
             "detection_probability": ("detection_probability", number(0.05, 0.999)),
             "slowest_mps": ("slowest_mps", number(0.0, 300.0)),
-            "hypotheses_at_most": ("hypotheses_at_most", _whole(10, 100_000)),
+            "hypotheses_at_most": ("hypotheses_at_most", whole(10, 100_000)),
         },
         required=("number", "along_m", "left_m", "antenna_height_m"),
         many=True,
@@ -222,8 +226,8 @@ TABLES: dict[str, Table] = {
             "longitude_deg": ("longitude_rad", _LONGITUDE),
             "radius_m": ("radius_m", _POSITIVE),
             "polygon_deg": ("polygon_rad", _polygon),
-            "from": ("valid_from", _instant),
-            "until": ("valid_until", _instant),
+            "from": ("valid_from", instant),
+            "until": ("valid_until", instant),
             "base_msl_m": ("base_msl_m", number(-1e4, 1e5)),
             "top_msl_m": ("top_msl_m", number(-1e4, 1e5)),
         },
