@@ -1,0 +1,1 @@
+"""Routes under threat (paper 002-3)."""
