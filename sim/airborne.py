@@ -20,13 +20,17 @@ from adapters.mavlink_frames import FrameEncoder
 from gateway.estimators.inertial import from_angles
 from gateway.geodesy import wrap_rad
 from sim.earth import Flown
+from sim.faulty_sensors import faulty_gps, gps_sigma_m
 from sim.scene import Aircraft, Scene
-from sim.sensors import GpsMeasured, gps_phases, gps_times, measure_gps, stream
+from sim.sensors import GpsMeasured, GpsParameters, gps_phases, gps_times, measure_gps, stream
 
 Floats = NDArray[np.float64]
 
-_FIXED_WING, _ARDUPILOT = 1, 3
-_ARMED_AUTO, _DISARMED, _ACTIVE, _STANDBY, _AUTO_MODE = 0x9D, 0x1D, 4, 3, 10
+_TYPES = {"aeroplane": 1, "copter": 2, "ship": 11}
+_AUTO_MODES = {"aeroplane": 10, "copter": 3, "ship": 10}
+_ARDUPILOT = 3
+_ARMED_AUTO, _DISARMED, _ACTIVE, _STANDBY = 0x9D, 0x1D, 4, 3
+_NO_FIX, _FIX_3D = 1, 3
 _UNKNOWN_16 = 65535
 
 Fields = dict[str, Any]
@@ -83,10 +87,10 @@ def _heartbeats(scene: Scene, aircraft: Aircraft) -> _Sayings:
 
     def fields(index: int) -> Fields:
         return {
-            "type": _FIXED_WING,
+            "type": _TYPES[aircraft.craft],
             "autopilot": _ARDUPILOT,
             "base_mode": _ARMED_AUTO if moves[index] else _DISARMED,
-            "custom_mode": _AUTO_MODE,
+            "custom_mode": _AUTO_MODES[aircraft.craft],
             "system_status": _ACTIVE if moves[index] else _STANDBY,
             "mavlink_version": 3,
         }
@@ -100,7 +104,7 @@ def _clocks(scene: Scene, aircraft: Aircraft) -> _Sayings:
     def fields(index: int) -> Fields:
         time_s = float(ticks[index])
         return {
-            "time_unix_usec": scene.at_ns(time_s) // 1000,
+            "time_unix_usec": scene.told_ns(aircraft.name, time_s) // 1000,
             "time_boot_ms": _boot_ms(scene, aircraft, time_s),
         }
 
@@ -163,26 +167,34 @@ def reports(scene: Scene, aircraft: Aircraft) -> GpsMeasured:
     """Every report of an aircraft's position source, also those that will not be heard."""
     start, end = scene.present(aircraft)
     generator = stream(scene.seed, "gps", aircraft.system)
-    valid = gps_times(scene.gps, start, end, gps_phases(scene.gps, generator))
-    return measure_gps(scene.gps, valid, scene.flown(aircraft, valid), generator)
+    gps, faults = aircraft.gps or scene.gps, scene.faults_of(aircraft.name)
+    valid = gps_times(gps, start, end, gps_phases(gps, generator))
+    sigma_m = gps_sigma_m(faults, gps.sigma_m, valid)
+    return faulty_gps(faults, measure_gps(gps, valid, scene.flown(aircraft, valid), generator, sigma_m))
 
 
 def _positions(scene: Scene, aircraft: Aircraft) -> list[_Sayings]:
-    measured = reports(scene, aircraft)
+    measured, gps = reports(scene, aircraft), aircraft.gps or scene.gps
     heard = np.flatnonzero(measured.heard)
-    arrives = measured.received_s[heard]
+    known = np.flatnonzero(measured.heard & measured.fix)
     yaw = scene.flown(aircraft, measured.valid_s).yaw_rad
-    raw = _Sayings("GPS_RAW_INT", arrives, lambda index: _gps_raw(scene, measured, int(heard[index])))
-    if not scene.gps.velocity:
-        return [raw]
+
+    def raw(index: int) -> Fields:
+        which = int(heard[index])
+        at_ns = scene.told_ns(aircraft.name, float(measured.valid_s[which]))
+        return _gps_raw(scene, gps, measured, which, at_ns)
+
+    said = _Sayings("GPS_RAW_INT", measured.received_s[heard], raw)
+    if not gps.velocity:
+        return [said]
 
     def fields(index: int) -> Fields:
-        which = int(heard[index])
+        which = int(known[index])
         boot_ms = _boot_ms(scene, aircraft, float(measured.valid_s[which]))
         return _global_position(scene, measured, which, boot_ms, float(yaw[which]))
 
     # in this order a receiver knows, when the raw fix comes, that it already has the autopilot's own estimate
-    return [_Sayings("GLOBAL_POSITION_INT", arrives, fields), raw]
+    return [_Sayings("GLOBAL_POSITION_INT", measured.received_s[known], fields), said]
 
 
 def _place(scene: Scene, measured: GpsMeasured, index: int) -> Fields:
@@ -193,20 +205,21 @@ def _place(scene: Scene, measured: GpsMeasured, index: int) -> Fields:
     }
 
 
-def _gps_raw(scene: Scene, measured: GpsMeasured, index: int) -> Fields:
-    gps, (east, north, _) = scene.gps, measured.velocity_mps[index]
-    ground_cmps = round(math.hypot(east, north) * 1e2) if gps.velocity else _UNKNOWN_16
-    course_cdeg = round(math.degrees(math.atan2(east, north)) % 360.0 * 1e2) % 36000 if gps.velocity else _UNKNOWN_16
+def _gps_raw(scene: Scene, gps: GpsParameters, measured: GpsMeasured, index: int, at_ns: int) -> Fields:
+    (east, north, _), fix = measured.velocity_mps[index], bool(measured.fix[index])
+    moves = gps.velocity and fix
+    ground_cmps = round(math.hypot(east, north) * 1e2) if moves else _UNKNOWN_16
+    course_cdeg = round(math.degrees(math.atan2(east, north)) % 360.0 * 1e2) % 36000 if moves else _UNKNOWN_16
     sigma_mm = round(gps.sigma_m * 1e3) if gps.accuracy_given else 0
     return {
-        "time_usec": scene.at_ns(float(measured.valid_s[index])) // 1000,
-        "fix_type": 3,
+        "time_usec": at_ns // 1000,
+        "fix_type": _FIX_3D if fix else _NO_FIX,
         **_place(scene, measured, index),
-        "eph": 80,
-        "epv": 120,
+        "eph": 80 if fix else _UNKNOWN_16,
+        "epv": 120 if fix else _UNKNOWN_16,
         "vel": ground_cmps,
         "cog": course_cdeg,
-        "satellites_visible": 12,
+        "satellites_visible": 12 if fix else 2,
         "alt_ellipsoid": round(float(measured.height_m[index]) * 1e3),
         "h_acc": sigma_mm,
         "v_acc": sigma_mm,

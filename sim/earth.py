@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -83,6 +84,14 @@ def fly(path: Path, runway: Runway, time_s: ArrayLike) -> Flown:
     )
 
 
+def plan_of(runway: Runway, latitude_rad: float, longitude_rad: float) -> tuple[float, float]:
+    """Where a place lies on the runway's ground plan, m: along the landing direction, and left of it."""
+    centre = math.degrees(runway.longitude_rad), math.degrees(runway.latitude_rad)
+    compass_deg, _, ground_m = _WGS84.inv(*centre, math.degrees(longitude_rad), math.degrees(latitude_rad))
+    left_rad = runway.landing_compass_rad - math.radians(compass_deg)
+    return ground_m * math.cos(left_rad), ground_m * math.sin(left_rad)
+
+
 def _geodesic_end(runway: Runway, compass_rad: Floats, ground_m: Floats) -> tuple[Floats, Floats, Floats]:
     """Latitude, longitude and outward direction at the ends of geodesics from the runway's centre, rad."""
     shape = ground_m.shape
@@ -94,16 +103,32 @@ def _geodesic_end(runway: Runway, compass_rad: Floats, ground_m: Floats) -> tupl
     return end_latitude, end_longitude, back + math.pi
 
 
+class Placed(Protocol):
+    """What has geodetic positions (...)."""
+
+    @property
+    def latitude_rad(self) -> Floats:
+        """Geodetic."""
+
+    @property
+    def longitude_rad(self) -> Floats:
+        """East."""
+
+    @property
+    def height_m(self) -> Floats:
+        """Above the ellipsoid."""
+
+
 def offset_geodetic(
-    flown: Flown, east_m: ArrayLike, north_m: ArrayLike, up_m: ArrayLike
+    placed: Placed, east_m: ArrayLike, north_m: ArrayLike, up_m: ArrayLike
 ) -> tuple[Floats, Floats, Floats]:
-    """Latitude, longitude (rad) and height (m) of points beside the true ones.
+    """Latitude, longitude (rad) and height (m) of points beside these.
 
     Offsets in metres east, north, up there, along the curvatures at the point: within 1 mm for 100 m.
     """
-    latitude, height = flown.latitude_rad, flown.height_m
+    latitude, height = placed.latitude_rad, placed.height_m
     east, north = np.asarray(east_m, dtype=np.float64), np.asarray(north_m, dtype=np.float64)
     northward = north / (meridian_radius_m(latitude) + height)
     eastward = east / ((prime_vertical_radius_m(latitude) + height) * np.cos(latitude))
-    longitude = wrap_rad(flown.longitude_rad + eastward)
+    longitude = wrap_rad(placed.longitude_rad + eastward)
     return latitude + northward, longitude, height + np.asarray(up_m, dtype=np.float64)

@@ -9,6 +9,7 @@ import numpy as np
 
 from gateway.observation import Truth
 from sim.airborne import frames
+from sim.faulty_links import carried
 from sim.radars import datagrams
 from sim.scene import STAMP_STEP_NS, Scene, Sent
 
@@ -17,7 +18,7 @@ def events(scene: Scene) -> Iterator[Sent]:
     """Everything that arrives, in order; stamps are strictly increasing multiples of 4 us over all links."""
 
     def link(name: str, said: Iterator[tuple[float, bytes]]) -> Iterator[tuple[float, str, bytes]]:
-        for arrives_s, data in said:
+        for arrives_s, data in carried(scene.faults, scene.seed, name, said, scene.duration_s):
             yield arrives_s, name, data
 
     links = [link(one.name, frames(scene, one)) for one in scene.aircraft]

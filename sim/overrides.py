@@ -11,17 +11,15 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, get_type_hints
 
-from sim.scene import LARGEST_SYSTEM, SayParameters
+from sim.parameter_tables import KINDS, Group, checked, with_fields
+from sim.scene import SayParameters
 from sim.sensors import GpsParameters, Intervals, RadarParameters
-
-Group = TypeVar("Group", GpsParameters, RadarParameters, SayParameters)
 
 
 class OverrideError(ValueError):
@@ -35,30 +33,13 @@ class SceneParameters:
     gps: GpsParameters = field(default_factory=GpsParameters)
     radars: tuple[RadarParameters, ...] = (RadarParameters(),)
     say: SayParameters = field(default_factory=SayParameters)
-    aircraft: int = 1
+    aircraft: int | None = None  # None: as many as the scene is written with
     duration_s: float = 600.0
-    abeam_deg: float = 0.0  # not 0: a second aircraft, seen from the first radar beside the first at this angle
+    abeam_deg: float = 0.0  # not 0: one more aircraft, seen from the first radar beside the first at this angle
 
 
-_PROBABILITIES = ("missing", "missing_range", "missing_azimuth", "missing_elevation", "detection_probability")
-_ABOVE_ZERO = ("period_s", "heartbeat_period_s", "clock_period_s", "attitude_period_s", "status_period_s", "duration_s")
-_ANY_SIGN = (
-    "_error_m",
-    "_error_rad",
-    "_error_deg",
-    "error_east_m",
-    "error_north_m",
-    "error_up_m",
-    "time_error_s",
-    "abeam_deg",
-)
-_COUNTS = {
-    "aircraft": (0, LARGEST_SYSTEM),
-    "radars": (0, 20),
-    "first_number": (1, 60_000),
-    "birds": (0, 1000),
-    "burst_plots": (0, 100_000),
-}
+_PLAIN: dict[str, type] = {"aircraft": int, "duration_s": float, "abeam_deg": float}
+_TRUTHS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
 
 
 def override(parameters: SceneParameters, changes: Iterable[str]) -> SceneParameters:
@@ -104,73 +85,57 @@ def _change(parameters: SceneParameters, key: str, text: str) -> SceneParameters
 
 def _change_scene(parameters: SceneParameters, key: str, text: str) -> SceneParameters:
     if key == "radars":
-        count = _value(key, text, int)
-        known = parameters.radars
-        last = known[-1] if known else RadarParameters()
-        more = tuple(replace(last, first_number=100 * index + 1) for index in range(len(known), count))
-        return replace(parameters, radars=(known + more)[:count])
-    plain: Mapping[str, type] = {"aircraft": int, "duration_s": float, "abeam_deg": float}
-    if key not in plain:
-        raise OverrideError(f"unknown setting {key!r}{_meant(key, [*plain, 'radars', 'gps.…', 'radar.…', 'say.…'])}.")
-    changed: dict[str, Any] = {key: _value(key, text, plain[key])}
+        return replace(parameters, radars=so_many(parameters.radars, _value(key, text, int, checked(key, int))))
+    if key not in _PLAIN:
+        raise OverrideError(f"unknown setting {key!r}{_meant(key, [*_PLAIN, 'radars', 'gps.…', 'radar.…', 'say.…'])}.")
+    changed: dict[str, Any] = {key: _value(key, text, _PLAIN[key], checked(key, _PLAIN[key]))}
     return replace(parameters, **changed)
 
 
+def so_many(radars: tuple[RadarParameters, ...], count: int) -> tuple[RadarParameters, ...]:
+    """The first of these, or more of the last one, which number their tracks from hundreds of their own."""
+    last = radars[-1] if radars else RadarParameters()
+    more = tuple(replace(last, first_number=100 * index + 1) for index in range(len(radars), count))
+    return (radars + more)[:count]
+
+
 def _with(parameters: Group, group: str, name: str, text: str) -> Group:
-    hints = get_type_hints(type(parameters))
-    radians = name.removesuffix("_deg") + "_rad"
-    degrees = name.endswith("_deg") and radians in hints
-    changes = radians if degrees else name
-    if changes not in hints:
-        raise OverrideError(f"{group}.{name}: unknown{_meant(name, [one.name for one in fields(parameters)])}.")
-    value = _value(f"{group}.{name}", text, hints[changes])
-    changed: dict[str, Any] = {changes: math.radians(value) if degrees else value}
-    result = replace(parameters, **changed)
-    if isinstance(result, GpsParameters) and result.latency_high_s < result.latency_low_s:
-        # one of the two was moved past the other: the other follows
-        both = {"latency_low_s": value, "latency_high_s": value}
-        result = replace(result, **both)
-    return result
+    keys = KINDS[type(parameters)].keys
+    if name not in keys:
+        raise OverrideError(f"{group}.{name}: unknown{_meant(name, list(keys))}.")
+    changes, convert = keys[name]
+    value = _value(f"{group}.{name}", text, get_type_hints(type(parameters))[changes], convert)
+    return with_fields(parameters, {changes: value})
 
 
-def _value(key: str, text: str, kind: Any) -> Any:
-    """The value of a setting: a number, a truth value or intervals, checked against what its name means."""
-    name = key.rpartition(".")[2]
-    if kind is bool:
-        return _truth_value(key, text)
-    if kind == Intervals:
-        return _intervals(key, text)
+def _value(key: str, text: str, kind: Any, convert: Callable[[Any], Any]) -> Any:
+    """The value of a setting, as a scene file would have it, checked as there."""
     try:
-        number = int(text) if kind is int else float(text)
+        if kind is bool:
+            return convert(_TRUTHS.get(text.lower(), text))
+        if kind == Intervals:
+            return convert(_pairs(key, text))
+        return convert(_number(text, kind))
     except ValueError as error:
-        wanted = "a whole number" if kind is int else "a number"
-        raise OverrideError(f"{key}: must be {wanted}, not {text!r}.") from error
-    low, high = _COUNTS.get(name, (-math.inf if name.endswith(_ANY_SIGN) else 0.0, math.inf))
-    if name in _PROBABILITIES:
-        low, high = 0.0, 1.0
-    if not low <= number <= high or math.isinf(number) or (name in _ABOVE_ZERO and number == 0.0):
-        least = "above 0" if name in _ABOVE_ZERO else "finite" if low < 0.0 else f"at least {low:g}"
-        bounds = f"from {low:g} to {high:g}" if math.isfinite(high) else least
-        raise OverrideError(f"{key}: must be {bounds}, not {text}.")
-    return number
+        raise OverrideError(f"{key}: {error}.") from error
 
 
-def _truth_value(key: str, text: str) -> bool:
-    words = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
-    if text.lower() not in words:
-        raise OverrideError(f"{key}: must be true or false, not {text!r}.")
-    return words[text.lower()]
+def _number(text: str, kind: type) -> float:
+    try:
+        return int(text) if kind is int else float(text)
+    except ValueError as error:
+        raise ValueError(f"must be {'a whole number' if kind is int else 'a number'}, not {text!r}") from error
 
 
-def _intervals(key: str, text: str) -> Intervals:
+def _pairs(key: str, text: str) -> list[list[float]]:
     """`60:90,200:230`: seconds from and until."""
     found = []
     for part in text.split(","):
         shape = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*:\s*(\d+(?:\.\d*)?)\s*", part)
         if shape is None or float(shape[1]) >= float(shape[2]):
             raise OverrideError(f"{key}: must be seconds FROM:UNTIL, such as 60:90 or 60:90,200:230, not {text!r}.")
-        found.append((float(shape[1]), float(shape[2])))
-    return tuple(found)
+        found.append([float(shape[1]), float(shape[2])])
+    return found
 
 
 def _meant(name: str, known: list[str]) -> str:

@@ -12,11 +12,13 @@ from adapters.landing_radar import MAXIMUM_PLOTS, Header, Plot, Status, encode
 from gateway.frames import RadarFrame, RunwayFrame, turn
 from gateway.settings import RadarSite, Site
 from sim.earth import Flown
+from sim.faulty_sensors import RadarFaults, places
 from sim.moving_clutter import draw_birds, draw_rain
 from sim.scene import Scene, SceneRadar
 from sim.sensors import PlotsMeasured, RadarParameters, draw_clutter, during, measure_radar, scan_times, stream
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 
 class RadarSight:
@@ -92,18 +94,31 @@ def plot_record(number: int, time_ns: int, polar: Floats, radial_mps: float, par
 
 def sightings(scene: Scene, radar: SceneRadar) -> list[tuple[int, NDArray[np.int64], PlotsMeasured]]:
     """For each aircraft in the scene: its track number, the scans (n,) it is there in, and what was measured."""
-    sight = RadarSight(scene.site, radar.site)
     scans = scan_times(radar.parameters, 0.0, scene.duration_s)
+    befalls = scene.faults_of(radar.name)
+    faults = RadarFaults.of(befalls, scans)
+    sights = [(RadarSight(scene.site, site), at) for site, at in places(radar.site, befalls, scans)]
     found = []
     for index, aircraft in enumerate(scene.aircraft):
         start, end = scene.present(aircraft)
         there = np.flatnonzero((scans >= start) & (scans < end))
-        position, velocity = sight.see(scene.flown(aircraft, scans[there]))
+        position, velocity = _seen(sights, there, scene.flown(aircraft, scans[there]))
         generator = stream(scene.seed, radar.name, aircraft.system)
-        measured = measure_radar(radar.parameters, scans[there], position, velocity, generator)
+        wrong = faults.among(there)
+        measured = measure_radar(radar.parameters, scans[there], position, velocity, generator, error=wrong.error)
         number = radar.parameters.first_number + index if radar.parameters.numbered else 0
-        found.append((number, there, measured))
+        found.append((number, there, wrong.leaves(measured)))
     return found
+
+
+def _seen(sights: Sequence[tuple[RadarSight, Bools]], scans: NDArray[np.int64], flown: Flown) -> tuple[Floats, Floats]:
+    """Positions and velocities (n, 3) in the frame of a radar that stands elsewhere in some of the scans (n,)."""
+    position, velocity = np.zeros((2, len(scans), 3))
+    for sight, at in sights:
+        here = at[scans, None]
+        there = sight.see(flown)
+        position, velocity = np.where(here, there[0], position), np.where(here, there[1], velocity)
+    return position, velocity
 
 
 def datagrams(scene: Scene, radar: SceneRadar) -> Iterator[tuple[float, bytes]]:
@@ -111,17 +126,21 @@ def datagrams(scene: Scene, radar: SceneRadar) -> Iterator[tuple[float, bytes]]:
     parameters, voice = radar.parameters, RadarVoice(radar.site.number, radar.key)
     scans = scan_times(parameters, 0.0, scene.duration_s)
     plots = _plots_of_scans(scene, radar, scans)
-    status = RadarSight(scene.site, radar.site).status(radar.site, parameters.period_s)
-    silent = during(parameters.dropouts, scans)
+    faults = scene.faults_of(radar.name)
+    told = [
+        (RadarSight(scene.site, site).status(site, parameters.period_s), at)
+        for site, at in places(radar.site, faults, scans, as_told=True)
+    ]
+    silent = during(parameters.dropouts, scans) | RadarFaults.of(faults, scans).off
     next_status_s = 0.0
     for scan, time_s in enumerate(scans.tolist()):
         arrives = time_s + parameters.latency_s
         if silent[scan] or arrives >= scene.duration_s:
             continue
-        stamp_ns = scene.at_ns(time_s + parameters.time_error_s)
+        stamp_ns = scene.told_ns(radar.name, time_s + parameters.time_error_s)
         if time_s >= next_status_s:
             next_status_s = time_s + parameters.status_period_s
-            yield arrives, voice.status(stamp_ns, status)
+            yield arrives, voice.status(stamp_ns, next(status for status, at in told if at[scan]))
         records = [plot_record(number, stamp_ns, polar, radial, parameters) for number, polar, radial in plots[scan]]
         for datagram in voice.plots(stamp_ns, records):
             yield arrives, datagram
@@ -136,7 +155,9 @@ def _plots_of_scans(scene: Scene, radar: SceneRadar, scans: Floats) -> list[list
     clutter, birds, rain = (stream(scene.seed, radar.name, name) for name in ("clutter", "birds", "rain"))
     strewn = [draw_clutter(radar.parameters, scans, clutter)]
     strewn += [draw_birds(radar.parameters, scans, birds), draw_rain(radar.parameters, scans, rain)]
-    for which, polar in strewn:
+    lost = RadarFaults.of(scene.faults_of(radar.name), scans).lost
+    for which, drawn in strewn:
+        polar = np.where(lost[which], np.nan, drawn)
         for scan, false_plot in zip(which.tolist(), polar, strict=True):
             if not np.isnan(false_plot).all():
                 plots[scan].append((0, false_plot, math.nan))

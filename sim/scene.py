@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gateway.settings import PositionSource, RadarSite, Site
 from sim.earth import Flown, fly
+from sim.faults import Fault
+from sim.faulty_sensors import clock_error_s
 from sim.paths import Path
 from sim.sensors import GpsParameters, RadarParameters
 
@@ -31,6 +34,9 @@ class SayParameters:
     booted_before_s: float = 30.0  # how long before it appears its autopilot was switched on
 
 
+Craft = Literal["aeroplane", "copter", "ship"]
+
+
 @dataclass(frozen=True, slots=True)
 class Aircraft:
     """One aircraft: its MAVLink system number, the way it flies, and a word for people on what it is doing."""
@@ -38,6 +44,8 @@ class Aircraft:
     system: int
     path: Path
     kind: str = "approach"
+    craft: Craft = "aeroplane"
+    gps: GpsParameters | None = None  # its own position source; None: as the scene's
 
     @property
     def name(self) -> str:
@@ -75,6 +83,7 @@ class Scene:
     gps: GpsParameters
     radars: tuple[SceneRadar, ...]
     say: SayParameters = SayParameters()
+    faults: tuple[Fault, ...] = ()
 
     @property
     def stated_site(self) -> Site:
@@ -101,6 +110,14 @@ class Scene:
     def at_ns(self, time_s: float) -> int:
         """A time of the scene as ns since 1970 UTC."""
         return self.start_ns + round(time_s * 1e9)
+
+    def told_ns(self, link: str, time_s: float) -> int:
+        """The same by the clock behind a link, which may have jumped."""
+        return self.at_ns(time_s + float(clock_error_s(self.faults, link, time_s)))
+
+    def faults_of(self, link: str) -> tuple[Fault, ...]:
+        """What befalls who speaks on a link."""
+        return tuple(fault for fault in self.faults if fault.befalls(link))
 
     @property
     def links(self) -> tuple[str, ...]:

@@ -90,6 +90,7 @@ class GpsMeasured:
     longitude_rad: Floats
     height_m: Floats
     velocity_mps: Floats  # NaN for a source that gives positions only
+    fix: Bools  # False: the source tells that it does not know where it is
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,12 +141,21 @@ def gps_phases(parameters: GpsParameters, generator: np.random.Generator, shape:
 
 
 def measure_gps(
-    parameters: GpsParameters, valid_s: Floats, flown: Flown, generator: np.random.Generator
+    parameters: GpsParameters,
+    valid_s: Floats,
+    flown: Flown,
+    generator: np.random.Generator,
+    sigma_m: ArrayLike | None = None,
 ) -> GpsMeasured:
-    """Reports of a position source at times (..., n), of the truth at these times ((n,) or (..., n))."""
+    """Reports of a position source at times (..., n), of the truth at these times ((n,) or (..., n)).
+
+    `sigma_m` (n,) is the noise an axis at each time, where it is not always the parameters'.
+    """
     shape = valid_s.shape
     own = generator.normal(size=(*shape[:-1], 1, 3)) * parameters.error_sigma_m
-    noise = generator.normal(size=(*shape, 3)) * parameters.sigma_m
+    noise = (
+        generator.normal(size=(*shape, 3)) * np.asarray(parameters.sigma_m if sigma_m is None else sigma_m)[..., None]
+    )
     velocity_noise = generator.normal(size=(*shape, 3)) * parameters.velocity_sigma_mps
     spread_s = parameters.latency_high_s - parameters.latency_low_s
     latency = parameters.latency_low_s + spread_s * generator.uniform(size=shape)
@@ -155,7 +165,7 @@ def measure_gps(
     latitude, longitude, height = offset_geodetic(flown, off[..., 0], off[..., 1], off[..., 2])
     velocity = flown.velocity_mps + velocity_noise if parameters.velocity else np.full((*shape, 3), np.nan)
     heard = ~(lost | during(parameters.dropouts, valid_s))
-    return GpsMeasured(valid_s, valid_s + latency, heard, latitude, longitude, height, velocity)
+    return GpsMeasured(valid_s, valid_s + latency, heard, latitude, longitude, height, velocity, np.ones(shape, bool))
 
 
 def scan_times(parameters: RadarParameters, start_s: float, end_s: float) -> Floats:
@@ -173,9 +183,11 @@ def measure_radar(
     velocity_mps: Floats,
     generator: np.random.Generator,
     shape: tuple[int, ...] = (),
+    error: ArrayLike = 0.0,
 ) -> PlotsMeasured:
     """Plots (shape, n) of one target at scan times (n,); its truth (n, 3) in the radar's frame.
 
+    `error` (n, 3) is what it measures too much at each time beside the parameters' constant errors.
     Source: 003 2.2 eq 5, the case.
     """
     count = (*shape, len(radar_m))
@@ -185,7 +197,9 @@ def measure_radar(
     radial_noise = generator.normal(size=count) * parameters.radial_velocity_sigma_mps
     true = polar_from_xyz(radar_m)
     p = parameters
-    errors = np.array([p.range_error_m, p.azimuth_error_rad, p.elevation_error_rad])
+    errors = np.array([p.range_error_m, p.azimuth_error_rad, p.elevation_error_rad]) + np.asarray(
+        error, dtype=np.float64
+    )
     sigmas = np.array([p.range_sigma_m, p.azimuth_sigma_rad, p.elevation_sigma_rad])
     polar = true + errors + noise * sigmas
     polar[..., 0] = np.maximum(polar[..., 0], 0.0)

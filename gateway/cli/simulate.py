@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 _HELP = """
 Play a simulated world onto the real wires: aircraft as MAVLink, radars as landing-radar datagrams, over UDP.
 
-Scenes: [bold]approach[/] (paper 003's case), [bold]landing[/] (the same down to a standstill), [bold]traffic[/] (many
-aircraft). The scene [bold]radar[/] is a landing radar that watches the aircraft of a recording or of a live link.
+A scene is a TOML file: one that comes along ([bold]--list[/] names them) or one of your own (docs/scenes.md);
+[bold]--show[/] prints one to begin with. The scene [bold]radar[/] is a landing radar that watches the aircraft of a
+recording or of a live link.
 
 Examples:
 
@@ -30,6 +31,12 @@ Examples:
   talkdown simulate traffic --set aircraft=12 --set radars=2 --set gps.error_east_m=30 --seed 7
 
   talkdown simulate approach --speed max --archive sessions
+
+  talkdown simulate --list
+
+  talkdown simulate gps-loss --show > mine.toml
+
+  talkdown simulate mine.toml --seed 7
 
   talkdown simulate radar --watch flight.tlog --site field.toml --archive sessions
 """
@@ -42,14 +49,22 @@ def register(app: typer.Typer) -> None:
 
 def simulate(
     scene: Annotated[
-        str, typer.Argument(metavar="SCENE", help="approach, landing, traffic, or radar.", show_default=False)
-    ],
+        str | None,
+        typer.Argument(
+            metavar="[SCENE]", help="A scene's name, a scene file, or radar; a folder for --list.", show_default=False
+        ),
+    ] = None,
     site: take.SiteOption = None,
     mavlink: Annotated[
         str, typer.Option("--mavlink", metavar="URL", help="Where aircraft send.")
     ] = "udpout:127.0.0.1:14550",
     radar: Annotated[str, typer.Option("--radar", metavar="URL", help="Where radars send.")] = "udpout:127.0.0.1:30070",
-    seed: Annotated[int, typer.Option("--seed", metavar="N", help="Of the random numbers.")] = 0,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            "--seed", metavar="N", help="Of the random numbers. (default: the scene's, 0)", show_default=False
+        ),
+    ] = None,
     speed: Annotated[str, typer.Option("--speed", metavar="max|N", help="N times real time.")] = "1",
     archive: Annotated[
         Path | None,
@@ -70,16 +85,32 @@ def simulate(
         str | None,
         typer.Option("--watch", metavar="FILE|URL", help="For the scene radar: what it looks at.", show_default=False),
     ] = None,
+    listed: Annotated[
+        bool, typer.Option("--list", help="List the scenes that there are, or those in a folder.")
+    ] = False,
+    shown: Annotated[bool, typer.Option("--show", help="Print the scene's file, to be copied and changed.")] = False,
     quiet: take.QuietOption = False,
 ) -> None:
     """Play a simulated world."""
+    from gateway.cli.scenes import list_scenes, show_scene
+
+    if listed:
+        list_scenes(scene)
+        return
+    if scene is None:
+        raise UsageError("Which scene? talkdown simulate --list names them; or give a scene file of your own.")
+    if shown:
+        show_scene(scene)
+        return
     pace = read_speed(speed, 1.0)
     if (scene == "radar") != (watch is not None):
         raise UsageError("--watch belongs to the scene radar: talkdown simulate radar --watch FILE|URL.")
     if watch is not None:
         from gateway.cli.watching import watch_and_send
 
-        watch_and_send(watch, site, radar, seed=seed, settings=settings or [], speed=pace, archive=archive, quiet=quiet)
+        watch_and_send(
+            watch, site, radar, seed=seed or 0, settings=settings or [], speed=pace, archive=archive, quiet=quiet
+        )
         return
     built = _build(scene, site, seed, settings or [])
     if archive is not None:
@@ -88,21 +119,21 @@ def simulate(
         _send(built, mavlink, radar, pace, quiet)
 
 
-def _build(name: str, site: Path | None, seed: int, settings: list[str]) -> Scene:
+def _build(name: str, site: Path | None, seed: int | None, settings: list[str]) -> Scene:
     import time
 
-    from gateway.settings import DEMO_SITE
+    from gateway.settings import SiteError
     from sim.overrides import OverrideError
-    from sim.scenes import build_scene
+    from sim.scenes import find_scene, stage
 
     place = take.read_place(site)
     keys = take.read_keys(place, site)
-    start_ns = time.time_ns() // 4000 * 4000
     try:
-        return build_scene(
-            name, start_ns=start_ns, site=place.site if place else DEMO_SITE, seed=seed, changes=settings, keys=keys
-        )
-    except OverrideError as error:
+        script = find_scene(name)
+        start_ns = time.time_ns() // 4000 * 4000 if script.start_ns is None else script.start_ns
+        there = place.site if place else None
+        return stage(script, start_ns=start_ns, site=there, seed=seed, changes=settings, keys=keys)
+    except (OverrideError, SiteError) as error:
         raise UsageError(str(error)) from error
 
 

@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Iterator
 
-from gateway.settings import DEMO_SITE, Site
+from gateway.settings import Site
 from sim.run import play_part
 from sim.scenes import build_scene
 
@@ -50,7 +50,7 @@ class SimulatedWorld:
 
     def _send(self, ports: dict[str, int], stop: threading.Event) -> None:
         start_ns = (time.time_ns() - round(self._from_s * 1e9)) // 4000 * 4000
-        scene = build_scene(self._name, start_ns=start_ns, site=DEMO_SITE, seed=self._seed)
+        scene = build_scene(self._name, start_ns=start_ns, seed=self._seed)
         addresses = {kind: (socket.AF_INET, ("127.0.0.1", port)) for kind, port in ports.items()}
         play_part(scene, addresses, from_s=self._from_s, until_s=self._until_s, stop=stop, progress=self._tell)
 

@@ -1,64 +1,71 @@
-"""The scenes that can be asked for by name."""
+"""Scenes: TOML files, those that are shipped and those that people write."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+from pathlib import Path
 
-from gateway.settings import DEMO_SITE, Site
-from sim.overrides import OverrideError, SceneParameters, override
+from gateway.settings import Site, SiteError
+from sim.overrides import OverrideError, SceneParameters
 from sim.scene import Scene
-from sim.scenes.approach import approach, approach_parameters, landing, landing_parameters
-from sim.scenes.conflicts import conflicts, conflicts_parameters
-from sim.scenes.placement import as_the_site_says
-from sim.scenes.traffic import traffic, traffic_parameters
+from sim.scenes.reading import parse_scene, read_scene
+from sim.scenes.script import Script
+from sim.scenes.staging import stage
 
 RESERVED = "radar"  # `simulate radar` is the radar that watches a recording or a link
 
-Build = Callable[[Site, SceneParameters, int, int], Scene]
+_SHIPPED = Path(__file__).parent
 
 
-@dataclass(frozen=True, slots=True)
-class SceneKind:
-    """A scene by name: what it shows, what can be set and what it is set to, and how it is built.
+def scenes_in(folder: Path) -> tuple[Path, ...]:
+    """The scene files of a folder: every .toml that has a table [scene]."""
+    return tuple(path for path in sorted(folder.glob("*.toml")) if "[scene]" in path.read_text("utf-8", "replace"))
 
-    `build(site, parameters, seed, start_ns)`.
+
+def scene_names() -> tuple[str, ...]:
+    """The names of the scenes that are shipped."""
+    return tuple(path.stem for path in scenes_in(_SHIPPED))
+
+
+def find_scene(name: str) -> Script:
+    """A scene by its name, or by its file.
+
+    Raises SiteError (one plain sentence) for an unknown name and for what is wrong in the file.
     """
-
-    says: str
-    parameters: SceneParameters
-    build: Build
-
-
-SCENES: Mapping[str, SceneKind] = {
-    "approach": SceneKind("one aircraft on 003's approach, 457 s", approach_parameters(), approach),
-    "landing": SceneKind("the same approach flown to this runway, down to a standstill", landing_parameters(), landing),
-    "traffic": SceneKind("many aircraft: arrivals, crossings, go-arounds, holdings", traffic_parameters(), traffic),
-    "conflicts": SceneKind("twenty pairs that lose their separation", conflicts_parameters(), conflicts),
-}
+    shipped = _SHIPPED / f"{name}.toml"
+    if name in scene_names():
+        return read_scene(shipped)
+    if name.endswith(".toml") or "/" in name:
+        return read_scene(Path(name))
+    near = get_close_matches(name, scene_names(), n=1)
+    meant = f"perhaps {near[0]} is meant" if near else f"there are {', '.join(scene_names())}"
+    raise SiteError(f"There is no scene {name!r}; {meant}. A file of your own is named with its ending, {name}.toml.")
 
 
 def build_scene(
     name: str,
     *,
     start_ns: int,
-    site: Site = DEMO_SITE,
-    seed: int = 0,
+    site: Site | None = None,
+    seed: int | None = None,
     changes: Iterable[str] = (),
     keys: Mapping[int, bytes] | None = None,
 ) -> Scene:
-    """The scene of a name at a site, with changes such as "gps.period_s=1".
-
-    `start_ns` is the session's beginning, ns since 1970 UTC; `keys` are those that radars sign with, by number.
-    Raises OverrideError (one plain sentence) for an unknown scene or a change that cannot be made.
-    """
-    kind = SCENES.get(name)
-    if kind is None:
-        raise OverrideError(f"There is no scene {name!r}; there are {', '.join(SCENES)}.")
-    parameters = override(as_the_site_says(kind.parameters, site), changes)
-    scene = kind.build(site, parameters, seed, start_ns)
-    keyed = [replace(radar, key=(keys or {}).get(radar.site.number)) for radar in scene.radars]
-    return replace(scene, radars=tuple(keyed))
+    """`stage` of the scene of a name or file. Raises OverrideError, SiteError: one plain sentence."""
+    return stage(find_scene(name), start_ns=start_ns, site=site, seed=seed, changes=changes, keys=keys)
 
 
-__all__ = ["RESERVED", "SCENES", "OverrideError", "SceneKind", "SceneParameters", "build_scene"]
+__all__ = [
+    "RESERVED",
+    "OverrideError",
+    "SceneParameters",
+    "Script",
+    "build_scene",
+    "find_scene",
+    "parse_scene",
+    "read_scene",
+    "scene_names",
+    "scenes_in",
+    "stage",
+]

@@ -1,4 +1,4 @@
-"""Scene `conflicts`: pairs of aircraft that lose their separation, one after another, in six ways: head-on, crossing, nearly
+"""Pairs of aircraft that lose their separation, one after another, in six ways: head-on, crossing, nearly
 abreast, overtaking, climbing through a level, and after a turn that ends 95 s before."""
 
 from __future__ import annotations
@@ -9,11 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gateway.settings import Site
-from sim.overrides import SceneParameters
 from sim.routes import RoutePath, RoutePoint
-from sim.scene import Aircraft, Scene
-from sim.scenes.placement import place_radars
-from sim.scenes.traffic import traffic_parameters
 from sim.sensors import stream
 
 BEFORE_S, AFTER_S = 240.0, 90.0  # that the aircraft of a pair fly before and after they meet
@@ -44,32 +40,16 @@ _MEETINGS = (
 )
 
 
-def conflicts_parameters() -> SceneParameters:
-    """Twenty pairs in twenty minutes, position sources as in `traffic`."""
-    return replace(traffic_parameters(), aircraft=40, duration_s=1200.0)
-
-
-def conflicts(site: Site, parameters: SceneParameters, seed: int, start_ns: int) -> Scene:
-    """Pairs 1 and 2, 3 and 4, ... meet one after another, each on a level of its own, about the runway."""
-    site, radars = place_radars(site, parameters.radars)
-    pairs = parameters.aircraft // 2
-    spacing_s = (parameters.duration_s - FIRST_S - AFTER_S) / max(pairs - 1, 1)
-    aircraft = []
+def conflicts(site: Site, count: int, duration_s: float, seed: int) -> list[tuple[str, RoutePath]]:
+    """Words and ways: aircraft 1 and 2, 3 and 4, ... meet one after another, each pair on a level of its own."""
+    pairs = count // 2
+    spacing_s = (duration_s - FIRST_S - AFTER_S) / max(pairs - 1, 1)
+    found = []
     for index in range(pairs):
         how = _MEETINGS[index % len(_MEETINGS)]
         one, other = _pair(site, how, index, FIRST_S + spacing_s * index, stream(seed, "conflicts", index))
-        aircraft += [Aircraft(2 * index + 1, one, how.name), Aircraft(2 * index + 2, other, how.name)]
-    return Scene(
-        name="conflicts",
-        site=site,
-        seed=seed,
-        start_ns=start_ns,
-        duration_s=parameters.duration_s,
-        aircraft=tuple(aircraft),
-        gps=parameters.gps,
-        radars=radars,
-        say=parameters.say,
-    )
+        found += [(how.name, one), (how.name, other)]
+    return found
 
 
 def _pair(

@@ -6,7 +6,6 @@ import math
 from dataclasses import replace
 
 from gateway.settings import RadarSite, Site, with_radar
-from sim.overrides import SceneParameters
 from sim.scene import SceneRadar
 from sim.sensors import RadarParameters
 
@@ -33,21 +32,15 @@ def place_radars(site: Site, parameters: tuple[RadarParameters, ...]) -> tuple[S
     return site, tuple(placed)
 
 
-def as_the_site_says(parameters: SceneParameters, site: Site) -> SceneParameters:
-    """Parameters with a radar for each of the site's, as noisy and as far-reaching as the site says.
+def as_the_site_says(parameters: RadarParameters, radar: RadarSite) -> RadarParameters:
+    """Parameters as noisy and as far-reaching as the site says of its radar.
 
     Angles are taken to four digits: the 0.0573 degrees of a site file mean 1 mrad.
     """
-    first = parameters.radars[0] if parameters.radars else RadarParameters()
-    radars = list(parameters.radars)
-    for index, radar in enumerate(site.radars):
-        known = radars[index] if index < len(radars) else replace(first, first_number=100 * index + 1)
-        said = replace(
-            known,
-            range_sigma_m=radar.range_sigma_m,
-            azimuth_sigma_rad=float(f"{radar.azimuth_sigma_rad:.4g}"),
-            elevation_sigma_rad=float(f"{radar.elevation_sigma_rad:.4g}"),
-            maximum_range_m=radar.maximum_range_m,
-        )
-        radars[index : index + 1] = [said]
-    return replace(parameters, radars=tuple(radars))
+    return replace(
+        parameters,
+        range_sigma_m=radar.range_sigma_m,
+        azimuth_sigma_rad=float(f"{radar.azimuth_sigma_rad:.4g}"),
+        elevation_sigma_rad=float(f"{radar.elevation_sigma_rad:.4g}"),
+        maximum_range_m=radar.maximum_range_m,
+    )

@@ -1,4 +1,4 @@
-"""Scene `traffic`: many aircraft about one runway. Straight-in arrivals, circuits from both sides, crossings,
+"""Many aircraft about one runway. Straight-in arrivals, circuits from both sides, crossings,
 holdings and
 go-arounds, in turn; landings follow one another in time slots."""
 
@@ -11,11 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gateway.settings import Runway, Site
-from sim.overrides import SceneParameters
 from sim.routes import RoutePath, RoutePoint
-from sim.scene import Aircraft, Scene
-from sim.scenes.placement import place_radars
-from sim.sensors import GpsParameters, stream
+from sim.sensors import stream
 
 FINAL_M = 13_000.0  # from where the glide path meets the runway to where the final begins
 JOIN_M = 22_000.0
@@ -26,32 +23,17 @@ FIRST_SLOT_S = 150.0
 AFTER_END_S = 400.0  # slots reach this far beyond the scene, so that it also ends with aircraft inbound
 ROLL_OUT_M, TAXI_MPS = 1_500.0, 15.0
 CLIMB_MPS = 90.0
+ALONE_S = 300.0  # between slots, for one that has no others about it
 LEVEL_M = 300.0  # between holding levels, and between crossings
 
 
-def traffic_parameters() -> SceneParameters:
-    """Twelve aircraft, ten minutes, one report a second, each position source with its own constant error."""
-    gps = GpsParameters(
-        period_s=1.0,
-        random_phase=True,
-        sigma_m=8.0,
-        error_east_m=0.0,
-        error_north_m=0.0,
-        error_up_m=0.0,
-        error_sigma_m=15.0,
-        latency_low_s=0.1,
-        latency_high_s=0.4,
-    )
-    return SceneParameters(gps=gps, aircraft=12, duration_s=600.0)
-
-
-def traffic(site: Site, parameters: SceneParameters, seed: int, start_ns: int) -> Scene:
-    """Aircraft about one runway, spread over the scene's duration; each has a random stream of its own."""
-    site, radars = place_radars(site, parameters.radars)
-    kinds = [_KINDS[index % len(_KINDS)] for index in range(parameters.aircraft)]
+def traffic(site: Site, count: int, duration_s: float, seed: int) -> list[tuple[str, RoutePath]]:
+    """Words for so many aircraft about one runway, and their ways, spread over a scene's duration; each has a random
+    stream of its own."""
+    kinds = [_KINDS[index % len(_KINDS)] for index in range(count)]
     slots = sum(kind.slot_point is not None for kind in kinds)
-    spacing_s = (parameters.duration_s + AFTER_END_S - FIRST_SLOT_S) / max(slots, 1)
-    aircraft, slot_s = [], FIRST_SLOT_S
+    spacing_s = (duration_s + AFTER_END_S - FIRST_SLOT_S) / max(slots, 1)
+    found, slot_s = [], FIRST_SLOT_S
     for index, kind in enumerate(kinds):
         path = kind.make(_Wish(site.runway, index // len(_KINDS), stream(seed, "traffic", index), spacing_s))
         if kind.slot_point is None:
@@ -59,18 +41,13 @@ def traffic(site: Site, parameters: SceneParameters, seed: int, start_ns: int) -
         else:
             start_s = slot_s - float(path.passes_s[kind.slot_point])
             slot_s += spacing_s
-        aircraft.append(Aircraft(index + 1, path.starting_at(start_s), kind.name))
-    return Scene(
-        name="traffic",
-        site=site,
-        seed=seed,
-        start_ns=start_ns,
-        duration_s=parameters.duration_s,
-        aircraft=tuple(aircraft),
-        gps=parameters.gps,
-        radars=radars,
-        say=parameters.say,
-    )
+        found.append((kind.name, path.starting_at(start_s)))
+    return found
+
+
+def one_of_the_traffic(word: str, site: Site, seed: int, system: int) -> RoutePath:
+    """The way of one aircraft that does what a word says, such as "holding"; it sets out at second 0."""
+    return _WORDS[word].make(_Wish(site.runway, system - 1, stream(seed, "vehicle", system), ALONE_S))
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,3 +178,5 @@ _KINDS = (
     _Kind("go-around", _go_around, _LOW_POINT),
     _Kind("holding", _holding, _ON_RUNWAY),
 )
+_WORDS = {kind.name: kind for kind in _KINDS}
+TRAFFIC_WORDS = tuple(_WORDS)
