@@ -1,0 +1,186 @@
+"""A way bent until J is least: a cubic B-spline whose control points L-BFGS moves, with the derivatives written out.
+
+Its first and last control points are the ends, so that it starts and ends exactly there; with a course, the second lies on
+the ray along it. Too narrow turns, and areas, cost more and more until none are left. Source: 002-3, the modern planner.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.optimize import minimize
+
+from sim.planning.areas import outside
+from sim.planning.field import stations
+from sim.planning.task import Task
+
+Floats = NDArray[np.float64]
+
+DEGREE = 3
+SPAN_M = 900.0  # of way for each control point; threats are 3 km apart
+LEAST_SPANS, MOST_SPANS = 12, 72
+_GAUSS = 5  # quadrature points in each span
+_UNIT_M = 1_000.0  # what places are scaled with for the search
+_EVEN = 1e-3  # the weight of even spacing, which J leaves open
+_WEIGHTS = (1.0, 10.0, 100.0, 1_000.0, 10_000.0)  # of too narrow turns and areas, one search after another
+_WIDER, _ASIDE_M = 1.01, 10.0  # what is asked for more than the turn radius and the areas' borders
+_DENSE = 12  # points a span at which the result is checked
+_ITERATIONS = 150
+
+
+@dataclass(frozen=True, slots=True)
+class Bent:
+    """What the search ended at: points (n, 2) m; the least turn radius; how far it is outside the areas, negative inside."""
+
+    curve_m: Floats
+    turn_radius_m: float
+    outside_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Basis:
+    """Values and two derivatives (m, n) of n basis functions at m parameters, and the quadrature's weights (m,)."""
+
+    value: Floats
+    first: Floats
+    second: Floats
+    weight: Floats
+
+
+@cache
+def _basis(controls: int, dense: bool) -> _Basis:
+    """For a clamped spline over [0, 1]."""
+    spans = controls - DEGREE
+    inner = np.linspace(0.0, 1.0, spans + 1)
+    knots = np.concatenate([np.zeros(DEGREE), inner, np.ones(DEGREE)])
+    if dense:
+        at, weight = np.linspace(0.0, 1.0, spans * _DENSE + 1), np.zeros(0)
+    else:
+        node, share = np.polynomial.legendre.leggauss(_GAUSS)
+        at = ((np.arange(spans)[:, None] + 0.5 * (node + 1.0)) / spans).ravel()
+        weight = np.tile(0.5 * share / spans, spans)
+    spline = BSpline(knots, np.eye(controls), DEGREE)
+    return _Basis(spline(at), spline.derivative(1)(at), spline.derivative(2)(at), weight)
+
+
+def bend(task: Task, way_m: Floats) -> Bent:
+    """The way (n, 2) as a smooth curve of the same kind whose J is least."""
+    length = stations(way_m)[-1]
+    controls = int(np.clip(round(length / SPAN_M), LEAST_SPANS, MOST_SPANS)) + DEGREE
+    search = _Search.of(task, controls)
+    free = search.begin(way_m)
+    for weight in _WEIGHTS:
+        found = minimize(
+            search.cost, free, args=(weight,), jac=True, method="L-BFGS-B", bounds=search.bounds(),
+            options={"maxiter": _ITERATIONS, "maxcor": 20, "ftol": 1e-9, "gtol": 1e-6},
+        )  # fmt: skip
+        free = found.x
+        bent = search.bent(free)
+        if bent.turn_radius_m >= task.turn_radius_m and bent.outside_m >= 0.0:
+            break
+    return bent
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """The control points (n, 2), in km, as an affine function of what is free: `fixed + moves @ free`."""
+
+    task: Task
+    fixed: Floats
+    moves: Floats
+    on_rays: int  # how many of what is free, the last of them, are distances along courses
+
+    @classmethod
+    def of(cls, task: Task, controls: int) -> _Search:
+        fixed = np.zeros((controls, 2))
+        fixed[0], fixed[-1] = task.start_m / _UNIT_M, task.goal_m / _UNIT_M
+        first, last = 1 + (task.start_course is not None), controls - 1 - (task.goal_course is not None)
+        columns = []
+        for control in range(first, last):
+            for axis in (0, 1):
+                column = np.zeros((controls, 2))
+                column[control, axis] = 1.0
+                columns.append(column)
+        for control, course, sign in ((1, task.start_course, 1.0), (controls - 2, task.goal_course, -1.0)):
+            if course is not None:
+                fixed[control] = fixed[0] if control == 1 else fixed[-1]
+                column = np.zeros((controls, 2))
+                column[control] = sign * course
+                columns.append(column)
+        on_rays = (task.start_course is not None) + (task.goal_course is not None)
+        return cls(task, fixed, np.stack(columns, axis=-1), on_rays)
+
+    def begin(self, way_m: Floats) -> Floats:
+        """What is free for control points that follow a way at even distances."""
+        station = stations(way_m)
+        at = np.linspace(0.0, station[-1], len(self.fixed))
+        controls = np.stack([np.interp(at, station, way_m[:, axis]) for axis in (0, 1)], axis=-1) / _UNIT_M
+        free = np.einsum("nak,na->k", self.moves, controls - self.fixed)
+        return np.clip(free, *np.array(self.bounds(), dtype=np.float64).T)
+
+    def bounds(self) -> list[tuple[float, float]]:
+        """The box of each control point, in which its curve stays, and rays that point forward."""
+        low, high = self.task.box_m / _UNIT_M
+        planar = (len(self.fixed) - 2 - self.on_rays) * [(low[0], high[0]), (low[1], high[1])]
+        least = 0.1 * SPAN_M / _UNIT_M
+        return [*planar, *(self.on_rays * [(least, 10.0 * least)])]
+
+    def controls(self, free: Floats) -> Floats:
+        """The control points (n, 2), km."""
+        return self.fixed + self.moves @ free
+
+    def bent(self, free: Floats) -> Bent:
+        """The curve, checked at many points."""
+        controls = self.controls(free)
+        basis = _basis(len(controls), dense=True)
+        place = basis.value @ controls * _UNIT_M
+        place[0], place[-1] = self.task.start_m, self.task.goal_m
+        first, second = basis.first @ controls, basis.second @ controls
+        speed = np.hypot(first[:, 0], first[:, 1])
+        bend_ = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / np.maximum(speed, 1e-9) ** 3
+        radius = _UNIT_M / max(float(bend_.max()), 1e-9)
+        return Bent(place, radius, float(outside(self.task.areas, place).min()))
+
+    def cost(self, free: Floats, weight: float) -> tuple[float, Floats]:
+        """J in km, with what too narrow turns and areas cost, and its derivative by what is free."""
+        controls = self.controls(free)
+        basis = _basis(len(controls), dense=False)
+        place, first, second = basis.value @ controls, basis.first @ controls, basis.second @ controls
+        speed = np.maximum(np.hypot(first[:, 0], first[:, 1]), 1e-6)
+        rate, by_place = self._rate(place, weight)
+        narrow, by_first, by_second = self._narrow(first, second, speed, weight)
+        rate = rate + narrow
+        length = float(np.linalg.norm(self.fixed[-1] - self.fixed[0]))
+        share = basis.weight
+        total = float((share * (rate * speed + _EVEN / length * speed**2)).sum())
+        along = (share * (rate / speed + 2.0 * _EVEN / length))[:, None] * first
+        by_controls = basis.value.T @ ((share * speed)[:, None] * by_place)
+        by_controls += basis.first.T @ (along + (share * speed)[:, None] * by_first)
+        by_controls += basis.second.T @ ((share * speed)[:, None] * by_second)
+        return total, np.einsum("nak,na->k", self.moves, by_controls)
+
+    def _rate(self, place: Floats, weight: float) -> tuple[Floats, Floats]:
+        """The price of a km at places (m, 2) km, (m,), and its derivative by the place (m, 2)."""
+        task = self.task
+        density, steep = task.threats.density_and_gradient(place * _UNIT_M)
+        rate, by_place = 1.0 + task.lambda_m4 * density, task.lambda_m4 * _UNIT_M * steep
+        for area in task.areas:
+            away, outward = area.distance(place * _UNIT_M)
+            inside = np.maximum(_ASIDE_M - away, 0.0) / _UNIT_M
+            rate = rate + 10.0 * weight * inside**2
+            by_place = by_place - 20.0 * weight * inside[:, None] * outward
+        return rate, by_place
+
+    def _narrow(self, first: Floats, second: Floats, speed: Floats, weight: float) -> tuple[Floats, Floats, Floats]:
+        """What turns narrower than allowed cost a km (m,), and its derivatives by the curve's two (m, 2)."""
+        radius = self.task.turn_radius_m * _WIDER / _UNIT_M
+        cross = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+        bent = radius * cross / speed**3
+        over = np.maximum(np.abs(bent) - 1.0, 0.0)
+        slope = weight * 2.0 * over * np.sign(bent) * radius / speed**3
+        across = np.stack([second[:, 1], -second[:, 0]], axis=-1) - (3.0 * cross / speed**2)[:, None] * first
+        return weight * over**2, slope[:, None] * across, slope[:, None] * np.stack([-first[:, 1], first[:, 0]], axis=-1)
