@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gateway.frames import RunwayFrame, turn
 from gateway.offline.report import Approach, Heard, approaches
 from gateway.offline.way import Flown
+from gateway.runtime.archived import read_table
 from gateway.runtime.folder import FolderError, Record, read_record
 from gateway.settings import Site
 from gateway.settings.reading import SiteError, parse_site
@@ -42,19 +43,17 @@ def approaches_of(session: Path) -> Reported:
 
     Raises FolderError where it is no whole session, OSError where its files cannot be read.
     """
-    import pyarrow.parquet as pq
-
     record = read_record(session)
-    if record.site is None or not (session / "tracks.parquet").is_file():
-        raise FolderError(f"{session} holds no tracks yet: it still runs, or it ended before its place was known.")
+    if record.site is None:
+        raise FolderError(f"{session} holds no tracks: it ended before its place was known.")
     try:
         site = parse_site(record.site)
     except SiteError as error:
         raise FolderError(f"The site in {session} is not understood: {error}") from error
     more = ("received", "track", "updated_by", "state", "radar_track")
-    tracks = pq.read_table(session / "tracks.parquet", columns=[*_COLUMNS, *_VELOCITIES, *more])
-    truth = session / "truth.parquet"
-    true = pq.read_table(truth, columns=[*_COLUMNS, *_VELOCITIES]) if truth.is_file() else tracks.slice(0, 0)
+    tracks = read_table(session, "tracks", [*_COLUMNS, *_VELOCITIES, *more])
+    has_truth = (session / "truth.parquet").is_file()
+    true = read_table(session, "truth", [*_COLUMNS, *_VELOCITIES]) if has_truth else tracks.slice(0, 0)
     frame = RunwayFrame(site.runway)
     names = [
         one or f"track {number}"

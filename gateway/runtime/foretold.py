@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.offline.score import Errors, Foretold, Way, errors
-from gateway.runtime.folder import FolderError
+from gateway.runtime.archived import read_table
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -21,7 +21,7 @@ def errors_of(session: Path) -> tuple[list[Errors], dict[str, str]]:
 
     Raises FolderError where the session has no predictions, OSError where the files cannot be read.
     """
-    predictions, tracks, truth = (_table(session, name) for name in ("predictions", "tracks", "truth"))
+    predictions, tracks, truth = (read_table(session, name) for name in ("predictions", "tracks", "truth"))
     true = _ways(truth, "aircraft")
     flown = _ways(tracks, "track")
     aircraft = dict(zip(tracks["track"].to_pylist(), tracks["aircraft"].to_pylist(), strict=True))
@@ -39,15 +39,6 @@ def errors_of(session: Path) -> tuple[list[Errors], dict[str, str]]:
         parts.append(errors(told, flown[track] if came is None else came, flown[track]))
     against = {"held against the truth": against_truth, "against the track itself": against_track}
     return parts, {what: ", ".join(who) for what, who in against.items() if who}
-
-
-def _table(session: Path, name: str) -> pa.Table:
-    import pyarrow.parquet as pq
-
-    path = session / f"{name}.parquet"
-    if not path.is_file():
-        raise FolderError(f"{session} is no archived session: it has no {name}.parquet.")
-    return pq.read_table(path)
 
 
 def _ways(table: pa.Table, by: str) -> dict[Any, Way]:

@@ -60,7 +60,7 @@ def _section(
     parts = [
         f'<section><div class="grade">{escape(one.grade)}</div>',
         f"<h1>{escape(one.aircraft)}, {escape(site.name)}</h1>",
-        f"<p>Approach {number} of {of} in {escape(name)}: {_utc(int(course.time[0]))} UTC, {lasted:.0f} s on final.</p>",
+        f"<p>Approach {number} of {of} in {escape(name)}: {utc(int(course.time[0]))} UTC, {lasted:.0f} s on final.</p>",
         "<h2>Grade</h2><ul>" + "".join(f"<li>{escape(reason)}</li>" for reason in one.reasons) + "</ul>",
         "<p class='note'>A: nothing was wrong. B: what was wrong was right at the lower gate. C: it was not right there, "
         "that gate was not seen to be passed, or the touchdown was beside the runway.</p>",
@@ -143,7 +143,7 @@ def _touchdowns(one: Approach) -> str:
     def row(who: str, seen: Touchdown) -> tuple[str, ...]:
         return (
             who,
-            _utc(seen.time, tenths=True),
+            utc(seen.time, tenths=True),
             f"{seen.past_threshold_m:.0f} m",
             f"{seen.left_m:+.1f} m",
             f"{seen.speed_mps:.1f} m/s",
@@ -206,6 +206,7 @@ def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return f"<table><tr>{head}</tr>{body}</table>"
 
 
-def _utc(time: int, *, tenths: bool = False) -> str:
+def utc(time: int, *, tenths: bool = False) -> str:
+    """An instant, ns since 1970 UTC, as date and time; with `tenths` as the time of day only."""
     moment = datetime.fromtimestamp(time // 1_000_000_000, UTC)
     return f"{moment:%H:%M:%S}.{time // 100_000_000 % 10}" if tenths else f"{moment:%Y-%m-%d %H:%M:%S}"
