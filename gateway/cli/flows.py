@@ -11,33 +11,41 @@ import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
+from gateway.cli.many import Crew, expanded, failures, tell_failures
+from gateway.cli.spread import spread
 
 if TYPE_CHECKING:
     from gateway.offline.flows import Flows, Track
+    from gateway.runtime.arrivals import Flight
 
 _HELP = """
 Find the flows of many arrivals: which ways they came, how many came that way, how long they took, and who came no way of many.
 
 Recorded ADS-B is read as CSV (also .gz) or Parquet with the columns timestamp, latitude, longitude, altitude (feet), and fid,
-flight_id, callsign or icao24; and so are archived sessions. Flights that do not end low are left out (paper 002-7).
+flight_id, callsign or icao24; and so are archived sessions, and folders of them. Flights that do not end low are left out
+(paper 002-7).
 
 Examples:
 
   talkdown flows arrivals.csv.gz --airport 49.01,2.55
 
-  talkdown flows sessions/* --method jaccard --archive flows
+  talkdown flows sessions --method jaccard --archive flows
 """
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("flows", help=_HELP)(flows)
+    app.command("flows", help=_HELP)(spread(flows))
 
 
 def flows(
     files: Annotated[
         list[Path],
-        typer.Argument(metavar="FILE|SESSION ...", help="Recorded ADS-B, archived sessions.", show_default=False),
+        typer.Argument(
+            metavar="FILE|SESSION|DIR...",
+            help="Recorded ADS-B, archived sessions, folders of them.",
+            show_default=False,
+        ),
     ],
     method: Annotated[
         str,
@@ -60,23 +68,23 @@ def flows(
         int, typer.Option("--least", metavar="N", min=2, help="How many flights make a flow; fewer came alone.")
     ] = 3,
     archive: take.ArchiveOption = None,
-    quiet: take.QuietOption = False,
-    json: take.JsonOption = False,
+    crew: Crew = Crew(),
+    telling: take.Telling = take.Telling(),
 ) -> None:
     """Find flows."""
-    from gateway.cli.progress import progressing
     from gateway.offline.flows import METHODS, found
-    from gateway.runtime.arrivals import ArrivalsError, read_arrivals
-    from gateway.runtime.folder import FolderError
+    from gateway.runtime.arrivals import ArrivalsError, arrivals_among
 
     chosen = next((one for one in METHODS if one == method), None)
     if chosen is None:
         raise UsageError(f"--method {method!r} is none of {', '.join(METHODS)}.")
     where = None if airport is None else _read_airport(airport)
+    paths = expanded(files, crew)
+    flights, failed = _read(paths, crew, show=not telling.quiet)
     try:
-        with progressing("reading", show=not quiet) as tell:
-            tracks, where, left_out = read_arrivals(files, where, tell)
-    except (ArrivalsError, FolderError) as error:
+        tracks, where, left_out = arrivals_among(flights, where)
+    except ArrivalsError as error:
+        tell_failures(failed, len(paths))
         raise UsageError(str(error)) from error
     try:
         result = found(tracks, chosen, least_flights=least)
@@ -86,12 +94,34 @@ def flows(
         ) from error
     if archive is not None:
         _archive(archive, tracks, result)
-    if json:
-        print(text.dumps(_document(tracks, result, where, left_out)))
-    elif not quiet:
+    if telling.json:
+        print(text.dumps(_document(tracks, result, where, left_out) | {"failed": failed}))
+    elif not telling.quiet:
         _show(tracks, result, where, left_out)
         if archive is not None:
             print(f"archived in {archive}; look: rerun {archive / 'flows.rrd'}")
+    tell_failures(failed, len(paths))
+
+
+def _read(paths: list[Path], crew: Crew, *, show: bool) -> tuple[list[Flight], list[dict[str, str]]]:
+    """The flights of all files and sessions, and those that could not be read."""
+    if len(paths) == 1:
+        return flights_one(paths[0]), []
+    outcomes = crew.work_on(flights_one, paths, "reading", show=show)
+    return [flight for one in outcomes for flight in one.result or ()], failures(paths, outcomes)
+
+
+def flights_one(path: Path) -> list[Flight]:
+    """The flights of one file or session. Raises UsageError, RunError."""
+    from gateway.runtime.arrivals import ArrivalsError, flights_of
+    from gateway.runtime.folder import FolderError
+
+    try:
+        return flights_of(path)
+    except (ArrivalsError, FolderError) as error:
+        raise UsageError(str(error)) from error
+    except OSError as error:
+        raise RunError(f"{path} could not be read: {(error.strerror or str(error)).lower()}.") from error
 
 
 def _read_airport(written: str) -> tuple[float, float]:

@@ -14,10 +14,19 @@ import typer
 from gateway.cli.failures import Failure, RunError, UsageError
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from gateway.runtime.many import Outcome
 
 Thing = TypeVar("Thing")
 Result = TypeVar("Result")
+
+_LONG_LINES = 240
+
+SessionsArgument = Annotated[
+    list[Path],
+    typer.Argument(metavar="SESSION|DIR...", help="Archived sessions, or folders of them.", show_default=False),
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,27 +89,41 @@ class Crew:
             raise RunError(f"Stopped by Ctrl-C: {done} of {len(things)} sessions were done.") from stopped
 
 
-def sessions_of(paths: Sequence[Path], crew: Crew) -> list[Path] | None:
-    """The sessions that paths name, where they name many: folders of sessions, or several; None: one session, or files.
+def expanded(paths: Sequence[Path], crew: Crew) -> list[Path]:
+    """Paths with folders of sessions replaced by their sessions; for a cluster absolute, and so the same elsewhere.
 
-    For a cluster they are absolute, and so the same elsewhere. Raises UsageError for a folder without sessions, and for
-    other files among sessions.
+    Raises UsageError for a folder without sessions.
     """
     from gateway.runtime.folder import FolderError
-    from gateway.runtime.sessions import is_session, session_folders
+    from gateway.runtime.sessions import session_folders
 
-    if not any(path.is_dir() for path in paths) or (len(paths) == 1 and is_session(paths[0])):
-        return None
     found: dict[Path, None] = {}
     for path in paths:
         try:
-            inside = session_folders(path)
+            inside = session_folders(path) if path.is_dir() else [path]
         except FolderError as error:
             raise UsageError(str(error)) from error
         if not inside:
             raise UsageError(f"{path} is no session, and holds none.")
         found.update(dict.fromkeys(inside if crew.scheduler is None else (one.absolute() for one in inside)))
     return list(found)
+
+
+def sessions_of(paths: Sequence[Path], crew: Crew) -> list[Path] | None:
+    """The sessions that paths name, where they name many: folders of sessions, or several sessions; else None."""
+    from gateway.runtime.sessions import is_session
+
+    if not any(path.is_dir() for path in paths) or (len(paths) == 1 and is_session(paths[0])):
+        return None
+    return expanded(paths, crew)
+
+
+def wide_console() -> Console:
+    """A terminal as it is; elsewhere lines as long as they need to be, for other programs."""
+    from rich.console import Console
+
+    console = Console(highlight=False)
+    return console if console.is_terminal else Console(highlight=False, width=_LONG_LINES)
 
 
 def names_of(sessions: Sequence[Path], taken: Callable[[str], bool] = lambda name: False) -> list[str]:

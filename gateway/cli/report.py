@@ -12,7 +12,7 @@ import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
-from gateway.cli.many import Crew, failures, names_of, sessions_of, tell_failures
+from gateway.cli.many import Crew, SessionsArgument, failures, names_of, sessions_of, tell_failures, wide_console
 from gateway.cli.spread import spread
 
 if TYPE_CHECKING:
@@ -34,11 +34,6 @@ Examples:
 
   talkdown report sessions --html reports
 """
-
-SessionsArgument = Annotated[
-    list[Path],
-    typer.Argument(metavar="SESSION|DIR...", help="Archived sessions, or folders of them.", show_default=False),
-]
 
 
 def register(app: typer.Typer) -> None:
@@ -190,16 +185,15 @@ def _entries(
 
 
 def _show_entries(entries: Sequence[Entry]) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(box=None, padding=(0, 2, 0, 0))
     for column in ("session", "aircraft", "grade", "reasons"):
-        table.add_column(column, overflow="fold")
+        table.add_column(column, overflow="fold", no_wrap=column != "reasons")
     for entry in entries:
         for place, one in enumerate(entry.approaches):
             table.add_row("" if place else entry.name, one.aircraft, one.grade, "; ".join(one.reasons))
-    console = Console(highlight=False)
+    console = wide_console()
     if table.row_count:
         console.print(table)
     counts = Counter(one.grade for entry in entries for one in entry.approaches)

@@ -1,41 +1,73 @@
-"""`talkdown score`: every prediction of an archived session against what came."""
+"""`talkdown score`: every prediction of archived sessions against what came."""
 
 from __future__ import annotations
 
+import json as text
 import math
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
+from gateway.cli.many import Crew, SessionsArgument, failures, names_of, sessions_of, tell_failures, wide_console
+from gateway.cli.spread import spread
 
 if TYPE_CHECKING:
     from gateway.offline.score import Score
 
 _HELP = """
-Hold every prediction of an archived session against what came: the simulator's truth where the session has it, else the
+Hold every prediction of archived sessions against what came: the simulator's truth where the session has it, else the
 track itself, later. By horizon: how far off, along and across, beside flying on at constant velocity, and how often it was
-within one and two sigmas; 68 and 95 % are honest.
+within one and two sigmas; 68 and 95 % are honest. Of many sessions a row each, and all of them together.
 
-Example:
+Examples:
 
   talkdown score sessions/20260301T120000Z-demo-field
+
+  talkdown score sessions --json
 """
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("score", help=_HELP)(score)
+    app.command("score", help=_HELP)(spread(score))
 
 
-def score(
-    session: Annotated[Path, typer.Argument(metavar="SESSION", help="An archived session.", show_default=False)],
-    json: take.JsonOption = False,
-) -> None:
+@dataclass(frozen=True, slots=True)
+class Scored:
+    """The scores of one session, and which predictions were held against what."""
+
+    rows: list[Score]
+    against: dict[str, str]
+
+    def document(self) -> dict[str, Any]:
+        """The same as plain values for JSON."""
+        return {"against": self.against, "scores": list(map(_document, self.rows))}
+
+
+def score(sessions: SessionsArgument, crew: Crew = Crew(), telling: take.Telling = take.Telling()) -> None:
     """Hold predictions against what came."""
+    many = sessions_of(sessions, crew)
+    if many is not None:
+        _score_many(many, crew, telling)
+        return
+    found = score_one(sessions[0])
+    if telling.json:
+        print(text.dumps(found.document()))
+    elif telling.quiet:
+        return
+    elif not found.rows:
+        print("No prediction of this session has come to its time: nothing to score.")
+    else:
+        _show(found.rows, found.against)
+
+
+def score_one(session: Path) -> Scored:
+    """The scores of one session, completed first if it was killed. Raises UsageError, RunError."""
     from gateway.offline.score import joined, scores
     from gateway.runtime.folder import FolderError
     from gateway.runtime.foretold import errors_of
@@ -48,15 +80,25 @@ def score(
         raise UsageError(str(error)) from error
     except OSError as error:
         raise RunError(f"{session} could not be read: {(error.strerror or str(error)).lower()}.") from error
-    found = scores(joined(parts))
-    if json:
-        import json as text
+    return Scored(scores(joined(parts)), against)
 
-        print(text.dumps({"against": against, "scores": [_document(one) for one in found]}))
-    elif not found:
-        print("No prediction of this session has come to its time: nothing to score.")
-    else:
-        _show(found, against)
+
+def _score_many(sessions: Sequence[Path], crew: Crew, telling: take.Telling) -> None:
+    from gateway.offline.pooled import pooled
+
+    outcomes = crew.work_on(score_one, sessions, "scoring", show=not telling.quiet)
+    pairs = zip(sessions, outcomes, strict=True)
+    scored = {session: one.result for session, one in pairs if one.result is not None}
+    together = pooled(one.rows for one in scored.values())
+    failed = failures(sessions, outcomes)
+    if telling.json:
+        documents = [{"session": str(session), **one.document()} for session, one in scored.items()]
+        pool = list(map(_document, together))
+        print(text.dumps({"sessions": documents, "pooled": pool, "failed": failed}))
+    elif not telling.quiet:
+        _show_each(names_of(list(scored)), [one.rows for one in scored.values()], together)
+        _show(together, {})
+    tell_failures(failed, len(sessions))
 
 
 def _document(one: Score) -> dict[str, Any]:
@@ -64,7 +106,7 @@ def _document(one: Score) -> dict[str, Any]:
     return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in plain.items()}
 
 
-def _show(found: list[Score], against: dict[str, str]) -> None:
+def _show(found: Sequence[Score], against: dict[str, str]) -> None:
     from rich.console import Console
     from rich.table import Table
 
@@ -83,3 +125,24 @@ def _show(found: list[Score], against: dict[str, str]) -> None:
     console.print(table)
     for what, who in against.items():
         console.print(f"{what}: {who}", soft_wrap=True, markup=False)
+
+
+def _show_each(names: Sequence[str], sessions: Sequence[Sequence[Score]], together: Sequence[Score]) -> None:
+    """A row a session: of all its predictions the RMS by horizon, beside that of constant velocity."""
+    from rich.table import Table
+
+    whole = together[:1]
+    horizons = [one.horizon_s for one in together if whole and one.group == whole[0].group]
+    table = Table(box=None, padding=(0, 2, 0, 0), caption="RMS m, and of constant velocity", caption_justify="left")
+    table.add_column("session", no_wrap=True, overflow="fold")
+    table.add_column("points", justify="right")
+    for horizon_s in horizons:
+        table.add_column(f"{horizon_s:g} s", justify="right", no_wrap=True)
+    for name, rows in zip(names, sessions, strict=True):
+        by_horizon = {one.horizon_s: one for one in rows if one.group == whole[0].group} if whole else {}
+        cells = [
+            f"{by_horizon[one].rms_m:.1f} / {by_horizon[one].straight_on_rms_m:.1f}" if one in by_horizon else "-"
+            for one in horizons
+        ]
+        table.add_row(name, str(sum(one.count for one in by_horizon.values())), *cells)
+    wide_console().print(table)

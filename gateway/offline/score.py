@@ -114,6 +114,7 @@ class Score:
     along_rms_m: float
     across_rms_m: float
     height_rms_m: float
+    heights: int  # of how many predictions both heights are known
     along_within: tuple[float, float]
     across_within: tuple[float, float]
 
@@ -188,6 +189,7 @@ def _score(group: str, horizon_s: float, some: Errors) -> Score:
         _rms(some.along_m),
         _rms(some.across_m),
         _rms(height),
+        len(height),
         _within(some.along_sigmas),
         _within(some.across_sigmas),
     )

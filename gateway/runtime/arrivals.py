@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pyproj import Proj
 
 from gateway.offline.flows import Track, cleaned
-from gateway.runtime.folder import FolderError
+from gateway.runtime.archived import read_table
 from gateway.runtime.sessions import mend
 
 Floats = NDArray[np.float64]
@@ -31,23 +31,26 @@ class ArrivalsError(Exception):
     """A file that holds no arrivals; one plain sentence."""
 
 
-def read_arrivals(
-    paths: Sequence[Path], airport_deg: tuple[float, float] | None, tell: Callable[[float], None]
+Flight = tuple[str, Floats]
+"""A name and (n, 4): time s, latitude, longitude degrees, height m."""
+
+
+def flights_of(path: Path) -> list[Flight]:
+    """The flights of a file, or of an archived session, that are long enough. Raises ArrivalsError, FolderError, OSError."""
+    found = _of_session(path) if path.is_dir() else _of_table(path)
+    return [(name, rows) for name, rows in found if len(rows) >= LEAST_POINTS and rows[-1, 0] - rows[0, 0] >= LEAST_S]
+
+
+def arrivals_among(
+    flights: Sequence[Flight], airport_deg: tuple[float, float] | None
 ) -> tuple[tuple[Track, ...], tuple[float, float], int]:
     """Tracks that end low, the airport (latitude, longitude, degrees), and how many others were left out.
 
     Without an airport it is the median of where flights end. The projection is Lambert's conformal conic about it (002-7 1.2).
-    Raises ArrivalsError, FolderError.
+    Raises ArrivalsError where there is no flight.
     """
-    flights: list[tuple[str, Floats]] = []  # name, (n, 4): time s, latitude, longitude degrees, height m
-    for place, path in enumerate(paths):
-        flights += _of_session(path) if path.is_dir() else _of_table(path)
-        tell(place / len(paths))
-    flights = [
-        (name, rows) for name, rows in flights if len(rows) >= LEAST_POINTS and rows[-1, 0] - rows[0, 0] >= LEAST_S
-    ]
     if not flights:
-        raise ArrivalsError(f"{paths[0]} holds no flight of {LEAST_POINTS} points and a minute.")
+        raise ArrivalsError(f"There is no flight of {LEAST_POINTS} points and a minute.")
     ends = np.array([rows[-1] for _, rows in flights])
     if airport_deg is None:
         airport_deg = float(np.median(ends[:, 1])), float(np.median(ends[:, 2]))
@@ -60,11 +63,10 @@ def read_arrivals(
         track = cleaned(Track(name, rows[:, 0] - rows[-1, 0], np.stack([east, north, rows[:, 3] - ground_m], axis=-1)))
         if len(track.time_s) >= LEAST_POINTS and track.place_m[-1, 2] < _LOW_M:
             tracks.append(track)
-    tell(1.0)
     return tuple(tracks), airport_deg, len(flights) - len(tracks)
 
 
-def _of_table(path: Path) -> list[tuple[str, Floats]]:
+def _of_table(path: Path) -> list[Flight]:
     """Flights of a CSV or Parquet file; altitudes are feet, as ADS-B has them."""
     try:
         table = pq.read_table(path) if path.suffix == ".parquet" else pyarrow.csv.read_csv(path)
@@ -85,13 +87,10 @@ def _of_table(path: Path) -> list[tuple[str, Floats]]:
     return _parted(names[good], rows[good])
 
 
-def _of_session(folder: Path) -> list[tuple[str, Floats]]:
+def _of_session(folder: Path) -> list[Flight]:
     """The system tracks of an archived session."""
     mend(folder)
-    path = folder / "tracks.parquet"
-    if not path.is_file():
-        raise FolderError(f"{folder} holds no tracks.parquet: it is no archived session.")
-    table = pq.read_table(path, columns=["time", "track", "aircraft", "latitude_deg", "longitude_deg", "height_m"])
+    table = read_table(folder, "tracks", ["time", "track", "aircraft", "latitude_deg", "longitude_deg", "height_m"])
     columns = [
         _seconds(table["time"]),
         *(_numbers(table[name]) for name in ("latitude_deg", "longitude_deg", "height_m")),
@@ -105,7 +104,7 @@ def _of_session(folder: Path) -> list[tuple[str, Floats]]:
     return _parted(names[good], rows[good])
 
 
-def _parted(names: NDArray[np.object_], rows: Floats) -> list[tuple[str, Floats]]:
+def _parted(names: NDArray[np.object_], rows: Floats) -> list[Flight]:
     """The rows of each name in the order of time, once for each time, parted where it was silent for long."""
     known = np.array([name is not None for name in names.tolist()])
     unique, whose = np.unique(names[known].astype(str), return_inverse=True)
