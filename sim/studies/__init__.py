@@ -21,6 +21,7 @@ STUDIES = (
     "reconstruction",
     "dead-reckoning",
     "flows",
+    "ship",
 )  # the modules of this package that have a `run`, `-` for `_`
 
 Progress = Callable[[str, float], None]  # what is being done, and the share of the whole that is done
