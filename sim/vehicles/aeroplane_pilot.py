@@ -1,0 +1,311 @@
+"""The autopilot of an aeroplane: take-off run, legs, circles, the glide path down to a standstill, going around, home at the end.
+
+Height and speed are held as energy: throttle gives the sum of what climbing and speeding up need, the nose shares it out;
+where the engine gives no more, speed goes before height.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from adapters.mission_writing import LAND, LOITER_TO_ALTITUDE, TAKE_OFF, MissionItem
+from sim.vehicles.aeroplane import GRAVITY_MPS2, Aeroplane, Controls
+from sim.vehicles.missions import DELAY, LOITER_TIME, LOITER_TURNS, LOITER_UNLIMITED, RETURN_HOME
+from sim.vehicles.motion import Answer, GoAround, GoTo, TakeOff
+from sim.vehicles.piloting import ACCEPTED, DECIDES_EVERY_S, Pilot
+from sim.vehicles.steering import Leg, OnLeg, Spot, bearing_rad, circle, distance_m, follow, place_on
+
+_CLIMB_PER_M, _SPEED_PER_S, _SPEEDING_UP = 0.3, 0.4, 0.15  # 1/s, 1/s, g
+_IN_CIRCLE_M = 30.0  # so near to it a circle counts as begun
+_REACHED_HEIGHT_M = 3.0
+_FLARE_S = 4.0  # the flare begins where the glide path is so many seconds of sinking above the ground
+_TOUCH_MPS = 0.4
+_STANDS_S = 2.0  # before it disarms
+_STEERS_RADPS = 0.3  # on wheels
+_GO_AROUND_M = 30.0
+_MODES = {"MANUAL": 0, "AUTO": 10, "RTL": 11, "LOITER": 12, "TAKEOFF": 13, "GUIDED": 15}
+
+
+@dataclass
+class AeroplanePilot(Pilot[Controls]):
+    """One aeroplane's. `goes_around`: how often it breaks off a landing by itself, at `decision_m` above the ground."""
+
+    aeroplane: Aeroplane = field(kw_only=True)
+    goes_around: int = field(default=0, kw_only=True)
+    decision_m: float = field(default=_GO_AROUND_M, kw_only=True)
+    mode: str = "MANUAL"
+    _leg: Leg | None = None
+    _climbs_to_m: float | None = None  # going around
+    _centre: Spot | None = None  # of the circle in GUIDED and LOITER
+    _radius_m: float = 0.0
+    _bearing_rad: float | None = None  # from a circle's centre, at the decision before
+
+    speed_setting: ClassVar[str] = "AIRSPEED_CRUISE"
+    modes: ClassVar[dict[str, int]] = _MODES
+
+    @property
+    def is_landed(self) -> bool:
+        """On its wheels."""
+        return self.aeroplane.is_on_ground
+
+    def decide(self) -> Controls:
+        """What bank, climb and throttle are to be."""
+        if not self.is_armed or self.mode == "MANUAL":
+            return Controls(is_braking=True)
+        if self.mode == "AUTO":
+            return self._follow_mission()
+        if self.is_landed or self.mode == "TAKEOFF":
+            return self._leave_ground(self._hold().height_m)
+        return self._circle(self._hold(), self._radius_m or self._own_radius())
+
+    def enter(self, mode: str) -> Answer:
+        """Change the mode: by hand only on the ground, everything else needs an armed vehicle to do something."""
+        if mode == "MANUAL" and not self.is_landed:
+            return Answer("denied", "nobody would fly it by hand")
+        if mode == "AUTO" and len(self.mission.items) < 2:
+            return Answer("denied", "there is no mission")
+        if mode == "AUTO" and self.mission.is_complete:
+            self.mission.restart()
+        self.mode, self._begun, self._climbs_to_m = mode, None, None
+        height = self.home.height_m + self.settings["RTL_ALTITUDE" if mode == "RTL" else "TKOFF_ALT"]
+        if mode == "RTL":
+            self._centre, self._radius_m = Spot(0.0, 0.0, height), 0.0
+        else:
+            north, east, now = self.here
+            self._centre, self._radius_m = Spot(north, east, height if self.is_landed else now), 0.0
+        return ACCEPTED
+
+    def take(self, order: TakeOff | GoTo | GoAround) -> Answer:
+        """Take off straight ahead and circle; circle about a place; break off a landing."""
+        if isinstance(order, GoAround):
+            item = self.mission.item
+            if self.mode != "AUTO" or item is None or item.command != LAND or self.is_landed:
+                return Answer("denied", "it is not on its way down to land")
+            self._go_around(item, order.height_m)
+            return ACCEPTED
+        if isinstance(order, TakeOff):
+            if not self.is_landed or not self.is_armed:
+                return Answer("denied", "it is in the air" if self.is_armed else "it is not armed")
+            self.settings["TKOFF_ALT"] = order.height_m
+            return self.enter("TAKEOFF")
+        height = self.here.height_m if order.height_m is None else order.height_m
+        if self.is_landed:
+            return Answer("denied", "it stands on the ground: take off first")
+        self.enter("GUIDED")
+        self._centre = self.plane.spot(order.latitude_rad, order.longitude_rad, height)
+        self._radius_m = order.radius_m or 0.0
+        return ACCEPTED
+
+    def _hold(self) -> Spot:
+        assert self._centre is not None  # every mode but MANUAL and AUTO begins with one
+        return self._centre
+
+    def _own_radius(self) -> float:
+        return self.settings["WP_LOITER_RAD"]
+
+    def _follow_mission(self) -> Controls:
+        if self._climbs_to_m is not None:
+            return self._climb_out(self._climbs_to_m)
+        item = self._next_item()
+        if item is None:
+            if not self.is_landed:
+                self.notes.append("Mission complete, going home")
+                self.enter("RTL")
+                return self.decide()
+            return Controls(is_braking=True)
+        flown = self._WAYS.get(item.command, AeroplanePilot._fly_leg)
+        if self.is_landed and item.command != LAND:
+            flown = AeroplanePilot._take_off
+        return flown(self, item)
+
+    def _begin(self, item: MissionItem) -> None:
+        """Legs begin where the last one ended, so that a turn's overshoot is made good, unless that is not where it is."""
+        end, here = self.spot(item), self.here
+        start = here
+        if self._leg is not None and not self.is_landed and distance_m(self._leg.end, here) < self._near_m:
+            north, east, _ = self._leg.end
+            start = Spot(north, east, here.height_m)
+        self._leg, self._bearing_rad = Leg(start, end), None
+        if item.command == LAND:
+            self.aeroplane.ground_m = end.height_m
+
+    @property
+    def _near_m(self) -> float:
+        return 2.0 * self.settings["WP_RADIUS"]
+
+    def _take_off(self, item: MissionItem) -> Controls:
+        target = self.spot(item)
+        if item.command == TAKE_OFF and self.here.height_m > target.height_m - _REACHED_HEIGHT_M and not self.is_landed:
+            self._reach()
+        return self._leave_ground(target.height_m)
+
+    def _leave_ground(self, height_m: float) -> Controls:
+        """Along the way it points, wheels down and then climbing, until that height; then, in TAKEOFF, circle."""
+        if self.is_landed and self.aeroplane.body.velocity_mps == (0.0, 0.0, 0.0):
+            yaw, here = self.body.attitude_rad[2], self.here
+            ahead = Spot(here.north_m + 1e4 * math.cos(yaw), here.east_m + 1e4 * math.sin(yaw), height_m)
+            self._leg = Leg(here, ahead)
+        if not self.is_landed and self.mode == "TAKEOFF" and self.here.height_m > height_m - _REACHED_HEIGHT_M:
+            north, east, _ = self.here
+            self.mode, self._centre = "LOITER", Spot(north, east, height_m)
+        assert self._leg is not None
+        pull, _ = self._pull_to(self._leg)
+        if self.is_landed:
+            return Controls(throttle=1.0, turn_radps=self._steer(pull), may_lift=True)
+        return self._hold_energy(height_m, 0.0, self._cruise(), 0.5 * self._bank(pull))
+
+    def _fly_leg(self, item: MissionItem) -> Controls:
+        """Along a leg; its height changes evenly over it, as far as the aeroplane can."""
+        leg = self._leg
+        assert leg is not None
+        pull, on = self._pull_to(leg)
+        if on.along_m >= leg.length_m or distance_m(self.here, leg.end) < self._radius_of(item):
+            self._reach()
+        height, climb = _height_on(leg, on, self._ground_speed())
+        self._tell(leg.end._replace(height_m=height), on.right_m, self._speed_error())
+        return self._hold_energy(height, climb, self._cruise(), self._bank(pull))
+
+    def _radius_of(self, item: MissionItem) -> float:
+        told = item.parameters[1]
+        return told if item.command != TAKE_OFF and 0.0 < told < math.inf else self.settings["WP_RADIUS"]
+
+    def _fly_circle(self, item: MissionItem) -> Controls:
+        """Round a place until what the item asks for has come about."""
+        radius = item.parameters[1 if item.command == LOITER_TO_ALTITUDE else 2]
+        if item.command == DELAY or not abs(radius) >= 1.0:
+            radius = self._own_radius()
+        centre = self.spot(item)
+        if item.command == DELAY and self._leg is not None:
+            centre = self._leg.start._replace(height_m=self._leg.start.height_m)
+        controls = self._circle(centre, radius)
+        is_in = abs(distance_m(self.here, centre) - abs(radius)) < max(_IN_CIRCLE_M, 0.2 * abs(radius))
+        if is_in:
+            self._waits_s += DECIDES_EVERY_S
+            bearing = bearing_rad(centre, self.here)
+            if self._bearing_rad is not None:
+                self._turned_rad += abs(math.remainder(bearing - self._bearing_rad, 2.0 * math.pi))
+            self._bearing_rad = bearing
+        amount = item.parameters[0]
+        is_over = {
+            LOITER_TURNS: self._turned_rad >= 2.0 * math.pi * amount,
+            LOITER_TIME: self._waits_s >= amount,
+            DELAY: self._waits_s >= amount,
+            LOITER_TO_ALTITUDE: abs(self.here.height_m - centre.height_m) < _REACHED_HEIGHT_M,
+        }
+        if is_in and is_over.get(item.command, False):
+            self._leg = Leg(centre, self.here)  # the next leg begins where the circle is left
+            self._reach()
+        return controls
+
+    def _circle(self, centre: Spot, radius_m: float) -> Controls:
+        north, east, _ = self.body.velocity_mps
+        pull, outside = circle(self.here, centre, radius_m, north, east, self.settings["NAVL1_PERIOD"])
+        self._tell(centre, -math.copysign(outside, radius_m), self._speed_error())
+        return self._hold_energy(centre.height_m, 0.0, self._cruise(), self._bank(pull))
+
+    def _go_home(self, item: MissionItem) -> Controls:
+        self._reach()
+        self.enter("RTL")
+        return self.decide()
+
+    def _land(self, item: MissionItem) -> Controls:
+        """Down the leg to the place of landing, flare, and brake to a standstill on its line."""
+        leg = self._leg
+        assert leg is not None
+        pull, on = self._pull_to(leg)
+        self._tell(leg.end, on.right_m, self._speed_error())
+        if self.is_landed:
+            return self._roll_out(pull)
+        above, speed = self.here.height_m - leg.end.height_m, self._ground_speed()
+        if self.goes_around > 0 and above <= self.decision_m:
+            self.goes_around -= 1
+            self._go_around(item, None)
+            return self._climb_out(leg.end.height_m + self.decision_m)
+        height, climb = _height_on(leg, on, speed)
+        sinks = max(-climb, 0.5)
+        if above < _FLARE_S * sinks / 2.0:
+            wanted = -max(above / _FLARE_S * 2.0, _TOUCH_MPS)
+            bank = 0.5 * self._bank(pull)
+            return Controls(bank, math.asin(max(wanted / self.aeroplane.airspeed_mps, -0.3)), 0.0, self._steer(pull))
+        return self._hold_energy(height, climb, self.aeroplane.parameters.approach_mps, self._bank(pull))
+
+    def _roll_out(self, pull: float) -> Controls:
+        if self._ground_speed() == 0.0:
+            self._waits_s += DECIDES_EVERY_S
+            if self._waits_s >= _STANDS_S:
+                self._reach()
+                self.is_armed, self.mode = False, "MANUAL"
+                self.notes.append("Landed, disarmed")
+        return Controls(turn_radps=self._steer(pull), is_braking=True)
+
+    def _go_around(self, item: MissionItem, height_m: float | None) -> None:
+        above = self.decision_m if height_m is None or height_m <= 0.0 else height_m
+        self._climbs_to_m = self.spot(item).height_m + above
+        self.notes.append("Going around")
+
+    def _climb_out(self, height_m: float) -> Controls:
+        """Straight on along the runway's line; then the approach from its beginning again."""
+        assert self._leg is not None
+        pull, on = self._pull_to(self._leg)
+        if self.here.height_m > height_m - _REACHED_HEIGHT_M and on.along_m > self._leg.length_m:
+            self._climbs_to_m = None
+            begins = self.mission.landing_sequence()
+            self._leg, self._begun = None, None
+            self._do(self.mission.go_to(max(self.mission.current - 1, 1) if begins is None else begins) or [])
+        return self._hold_energy(height_m, 0.0, self._cruise(), self._bank(pull))
+
+    def _pull_to(self, leg: Leg) -> tuple[float, OnLeg]:
+        on = place_on(leg, self.here)
+        north, east, _ = self.body.velocity_mps
+        return follow(on, north, east, self.settings["NAVL1_PERIOD"]), on
+
+    def _bank(self, pull_mps2: float) -> float:
+        limit = math.radians(self.settings["ROLL_LIMIT_DEG"])
+        return min(max(math.atan(pull_mps2 / GRAVITY_MPS2), -limit), limit)
+
+    def _steer(self, pull_mps2: float) -> float:
+        speed = max(self._ground_speed(), 1.0)
+        return min(max(pull_mps2 / speed, -_STEERS_RADPS), _STEERS_RADPS)
+
+    def _ground_speed(self) -> float:
+        return math.hypot(self.body.velocity_mps[0], self.body.velocity_mps[1])
+
+    def _cruise(self) -> float:
+        p = self.aeroplane.parameters
+        return min(max(self.settings["AIRSPEED_CRUISE"], 1.1 * p.slowest_mps), p.fastest_mps)
+
+    def _speed_error(self) -> float:
+        return self._cruise() - self.aeroplane.airspeed_mps
+
+    def _hold_energy(self, height_m: float, climb_mps: float, speed_mps: float, bank_rad: float) -> Controls:
+        """Towards a height that itself climbs, at an airspeed."""
+        plane, p = self.aeroplane, self.aeroplane.parameters
+        speed = max(plane.airspeed_mps, p.slowest_mps)
+        climb = climb_mps + _CLIMB_PER_M * (height_m - self.here.height_m)
+        sine = min(max(climb, -p.sink_mps), p.climb_mps) / speed
+        faster = min(max(_SPEED_PER_S * (speed_mps - plane.airspeed_mps) / GRAVITY_MPS2, -_SPEEDING_UP), _SPEEDING_UP)
+        needs = plane.drag(speed, 1.0 / math.cos(bank_rad))
+        throttle = (needs + sine + faster) / p.thrust
+        if throttle > 1.0:
+            sine = min(sine, p.thrust - needs - max(faster, 0.0))
+        elif plane.airspeed_mps > p.fastest_mps:
+            sine = max(sine, -needs)
+        return Controls(bank_rad, math.asin(min(max(sine, -0.4), 0.4)), min(max(throttle, 0.0), 1.0))
+
+    _WAYS: ClassVar[dict[int, Callable[[AeroplanePilot, MissionItem], Controls]]] = {
+        TAKE_OFF: _take_off,
+        LAND: _land,
+        RETURN_HOME: _go_home,
+        **dict.fromkeys((LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE, DELAY), _fly_circle),
+    }
+
+
+def _height_on(leg: Leg, on: OnLeg, speed_mps: float) -> tuple[float, float]:
+    """Where the leg's straight line is beside the vehicle, and how fast that climbs for one that goes along it, m, m/s."""
+    start, end, length = leg.start.height_m, leg.end.height_m, leg.length_m
+    if not 0.0 < on.along_m < length:
+        return (end if on.along_m > 0.0 or length < 1.0 else start), 0.0
+    return start + (end - start) * on.along_m / length, (end - start) / length * speed_mps
