@@ -1,6 +1,7 @@
 """What a simulated aircraft says on its MAVLink link, frame by frame, in order of arrival.
 
-HEARTBEAT, SYSTEM_TIME, ATTITUDE and SIM_STATE (the truth) are said at their periods; GPS_RAW_INT and
+HEARTBEAT, SYSTEM_TIME, ATTITUDE and SIM_STATE (the truth) are said at their periods, HIGHRES_IMU and VFR_HUD by aircraft
+with an inertial unit; GPS_RAW_INT and
 GLOBAL_POSITION_INT carry the time at which the position was so, and arrive as late as the position source is.
 A source that gives positions only sends no GLOBAL_POSITION_INT: that message has no way to leave the velocity
 out.
@@ -9,9 +10,7 @@ out.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +20,8 @@ from gateway.estimators.inertial import from_angles
 from gateway.geodesy import wrap_rad
 from sim.earth import Flown
 from sim.faulty_sensors import faulty_gps, gps_sigma_m
+from sim.inertial_sayings import inertial_sayings
+from sim.sayings import Fields, Sayings, boot_s, ticks
 from sim.scene import Aircraft, Scene
 from sim.sensors import GpsMeasured, GpsParameters, gps_phases, gps_times, measure_gps, stream
 
@@ -32,17 +33,6 @@ _ARDUPILOT = 3
 _ARMED_AUTO, _DISARMED, _ACTIVE, _STANDBY = 0x9D, 0x1D, 4, 3
 _NO_FIX, _FIX_3D = 1, 3
 _UNKNOWN_16 = 65535
-
-Fields = dict[str, Any]
-
-
-@dataclass(frozen=True, slots=True)
-class _Sayings:
-    """Messages of one name: when each arrives (n,), and a function from its index to its fields."""
-
-    name: str
-    arrives_s: Floats
-    fields: Callable[[int], Fields]
 
 
 def frames(scene: Scene, aircraft: Aircraft) -> Iterator[tuple[float, bytes]]:
@@ -56,6 +46,7 @@ def frames(scene: Scene, aircraft: Aircraft) -> Iterator[tuple[float, bytes]]:
         _attitudes(scene, aircraft),
         *_truths(scene, aircraft),
         *_positions(scene, aircraft),
+        *inertial_sayings(scene, aircraft),
     ]
     arrives = np.concatenate([one.arrives_s for one in sayings])
     which = np.repeat(np.arange(len(sayings)), [len(one.arrives_s) for one in sayings])
@@ -68,22 +59,13 @@ def frames(scene: Scene, aircraft: Aircraft) -> Iterator[tuple[float, bytes]]:
             yield float(arrives[place]), encoder.encode(saying.name, **saying.fields(int(index[place])))
 
 
-def _ticks(scene: Scene, aircraft: Aircraft, period_s: float) -> Floats:
-    """Times of a message with a period, in whole ms; aircraft do not all speak at the same instant."""
-    start, end = scene.present(aircraft)
-    first = start + 0.037 * (aircraft.system - 1) % min(period_s, 1.0)
-    return np.asarray(np.round(np.arange(first, end, period_s), 3), dtype=np.float64)
-
-
 def _boot_ms(scene: Scene, aircraft: Aircraft, time_s: float) -> int:
-    """A time of the scene by the aircraft's own clock, which runs in whole milliseconds since it was switched on."""
-    start, _ = scene.present(aircraft)
-    return round((time_s - start + scene.say.booted_before_s) * 1000.0)
+    return round(boot_s(scene, aircraft, time_s) * 1000.0)
 
 
-def _heartbeats(scene: Scene, aircraft: Aircraft) -> _Sayings:
-    ticks = _ticks(scene, aircraft, scene.say.heartbeat_period_s)
-    moves = np.hypot(*scene.flown(aircraft, ticks).velocity_mps[:, :2].T) > 0.0
+def _heartbeats(scene: Scene, aircraft: Aircraft) -> Sayings:
+    at_s = ticks(scene, aircraft, scene.say.heartbeat_period_s)
+    moves = np.hypot(*scene.flown(aircraft, at_s).velocity_mps[:, :2].T) > 0.0
 
     def fields(index: int) -> Fields:
         return {
@@ -95,30 +77,30 @@ def _heartbeats(scene: Scene, aircraft: Aircraft) -> _Sayings:
             "mavlink_version": 3,
         }
 
-    return _Sayings("HEARTBEAT", ticks + scene.say.latency_s, fields)
+    return Sayings("HEARTBEAT", at_s + scene.say.latency_s, fields)
 
 
-def _clocks(scene: Scene, aircraft: Aircraft) -> _Sayings:
-    ticks = _ticks(scene, aircraft, scene.say.clock_period_s)
+def _clocks(scene: Scene, aircraft: Aircraft) -> Sayings:
+    at_s = ticks(scene, aircraft, scene.say.clock_period_s)
 
     def fields(index: int) -> Fields:
-        time_s = float(ticks[index])
+        time_s = float(at_s[index])
         return {
             "time_unix_usec": scene.told_ns(aircraft.name, time_s) // 1000,
             "time_boot_ms": _boot_ms(scene, aircraft, time_s),
         }
 
-    return _Sayings("SYSTEM_TIME", ticks + scene.say.latency_s, fields)
+    return Sayings("SYSTEM_TIME", at_s + scene.say.latency_s, fields)
 
 
-def _attitudes(scene: Scene, aircraft: Aircraft) -> _Sayings:
-    ticks = _ticks(scene, aircraft, scene.say.attitude_period_s)
-    flown = scene.flown(aircraft, ticks)
+def _attitudes(scene: Scene, aircraft: Aircraft) -> Sayings:
+    at_s = ticks(scene, aircraft, scene.say.attitude_period_s)
+    flown = scene.flown(aircraft, at_s)
     yaw = wrap_rad(flown.yaw_rad)
 
     def fields(index: int) -> Fields:
         return {
-            "time_boot_ms": _boot_ms(scene, aircraft, float(ticks[index])),
+            "time_boot_ms": _boot_ms(scene, aircraft, float(at_s[index])),
             "roll": float(flown.roll_rad[index]),
             "pitch": float(flown.pitch_rad[index]),
             "yaw": float(yaw[index]),
@@ -127,18 +109,18 @@ def _attitudes(scene: Scene, aircraft: Aircraft) -> _Sayings:
             "yawspeed": float(flown.turn_radps[index]),
         }
 
-    return _Sayings("ATTITUDE", ticks + scene.say.latency_s, fields)
+    return Sayings("ATTITUDE", at_s + scene.say.latency_s, fields)
 
 
-def _truths(scene: Scene, aircraft: Aircraft) -> list[_Sayings]:
+def _truths(scene: Scene, aircraft: Aircraft) -> list[Sayings]:
     """SIM_STATE has no time of its own: it is said at once, at the times of attitudes where the periods allow."""
     if scene.say.truth_period_s <= 0.0:
         return []
-    ticks = _ticks(scene, aircraft, scene.say.truth_period_s)
-    flown = scene.flown(aircraft, ticks)
+    at_s = ticks(scene, aircraft, scene.say.truth_period_s)
+    flown = scene.flown(aircraft, at_s)
     stands = from_angles(flown.roll_rad, flown.pitch_rad, flown.yaw_rad)
     return [
-        _Sayings("SIM_STATE", ticks + scene.say.latency_s, lambda index: _sim_state(scene, flown, stands[index], index))
+        Sayings("SIM_STATE", at_s + scene.say.latency_s, lambda index: _sim_state(scene, flown, stands[index], index))
     ]
 
 
@@ -173,7 +155,7 @@ def reports(scene: Scene, aircraft: Aircraft) -> GpsMeasured:
     return faulty_gps(faults, measure_gps(gps, valid, scene.flown(aircraft, valid), generator, sigma_m))
 
 
-def _positions(scene: Scene, aircraft: Aircraft) -> list[_Sayings]:
+def _positions(scene: Scene, aircraft: Aircraft) -> list[Sayings]:
     measured, gps = reports(scene, aircraft), aircraft.gps or scene.gps
     heard = np.flatnonzero(measured.heard)
     known = np.flatnonzero(measured.heard & measured.fix)
@@ -184,7 +166,7 @@ def _positions(scene: Scene, aircraft: Aircraft) -> list[_Sayings]:
         at_ns = scene.told_ns(aircraft.name, float(measured.valid_s[which]))
         return _gps_raw(scene, gps, measured, which, at_ns)
 
-    said = _Sayings("GPS_RAW_INT", measured.received_s[heard], raw)
+    said = Sayings("GPS_RAW_INT", measured.received_s[heard], raw)
     if not gps.velocity:
         return [said]
 
@@ -194,7 +176,7 @@ def _positions(scene: Scene, aircraft: Aircraft) -> list[_Sayings]:
         return _global_position(scene, measured, which, boot_ms, float(yaw[which]))
 
     # in this order a receiver knows, when the raw fix comes, that it already has the autopilot's own estimate
-    return [_Sayings("GLOBAL_POSITION_INT", measured.received_s[known], fields), said]
+    return [Sayings("GLOBAL_POSITION_INT", measured.received_s[known], fields), said]
 
 
 def _place(scene: Scene, measured: GpsMeasured, index: int) -> Fields:

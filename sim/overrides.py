@@ -6,6 +6,7 @@
     gps.dropouts=60:90,200:230       seconds without it
     radar.azimuth_error_deg=0.5      every radar; angles may be written in _rad or _deg
     radar2.detection_probability=0.9 radar number 2 alone
+    imu.rate_hz=50                   an inertial unit in every aircraft
     say.truth_period_s=0             what aircraft say beside their positions
 """
 
@@ -19,7 +20,7 @@ from typing import Any, get_type_hints
 
 from sim.parameter_tables import KINDS, Group, checked, with_fields
 from sim.scene import SayParameters
-from sim.sensors import GpsParameters, Intervals, RadarParameters
+from sim.sensors import GpsParameters, ImuParameters, Intervals, RadarParameters
 
 
 class OverrideError(ValueError):
@@ -31,6 +32,7 @@ class SceneParameters:
     """All that can be set in a scene. `radars` holds one entry for each radar, in the order of their numbers."""
 
     gps: GpsParameters = field(default_factory=GpsParameters)
+    imu: ImuParameters = field(default_factory=ImuParameters)
     radars: tuple[RadarParameters, ...] = (RadarParameters(),)
     say: SayParameters = field(default_factory=SayParameters)
     aircraft: int | None = None  # None: as many as the scene is written with
@@ -66,11 +68,13 @@ def _change(parameters: SceneParameters, key: str, text: str) -> SceneParameters
         return _change_scene(parameters, key, text)
     if group == "gps":
         return replace(parameters, gps=_with(parameters.gps, group, name, text))
+    if group == "imu":
+        return replace(parameters, imu=_with(parameters.imu, group, name, text))
     if group == "say":
         return replace(parameters, say=_with(parameters.say, group, name, text))
     one = re.fullmatch(r"radar(\d*)", group)
     if one is None:
-        raise OverrideError(f"{key}: unknown group {group!r}; known are gps, radar, radar1, radar2, ... and say.")
+        raise OverrideError(f"{key}: unknown group {group!r}; known are gps, imu, radar, radar1, radar2, ... and say.")
     count = len(parameters.radars)
     if one[1] and not 1 <= int(one[1]) <= count:
         raise OverrideError(f"{key}: the scene has {count} radar(s); add radars={one[1]} to have more.")
@@ -87,7 +91,9 @@ def _change_scene(parameters: SceneParameters, key: str, text: str) -> ScenePara
     if key == "radars":
         return replace(parameters, radars=so_many(parameters.radars, _value(key, text, int, checked(key, int))))
     if key not in _PLAIN:
-        raise OverrideError(f"unknown setting {key!r}{_meant(key, [*_PLAIN, 'radars', 'gps.…', 'radar.…', 'say.…'])}.")
+        raise OverrideError(
+            f"unknown setting {key!r}{_meant(key, [*_PLAIN, 'radars', 'gps.…', 'imu.…', 'radar.…', 'say.…'])}."
+        )
     changed: dict[str, Any] = {key: _value(key, text, _PLAIN[key], checked(key, _PLAIN[key]))}
     return replace(parameters, **changed)
 

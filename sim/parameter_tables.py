@@ -12,12 +12,20 @@ from typing import Any, TypeVar, get_type_hints
 
 from gateway.settings.tables import Convert, Table, flag
 from sim.scene import LARGEST_SYSTEM, SayParameters
-from sim.sensors import GpsParameters, Intervals, RadarParameters
+from sim.sensors import GpsParameters, ImuParameters, Intervals, RadarParameters
 
-Group = TypeVar("Group", GpsParameters, RadarParameters, SayParameters)
+Group = TypeVar("Group", GpsParameters, ImuParameters, RadarParameters, SayParameters)
 
 _PROBABILITIES = ("missing", "missing_range", "missing_azimuth", "missing_elevation", "detection_probability", "share")
-_ABOVE_ZERO = ("period_s", "heartbeat_period_s", "clock_period_s", "attitude_period_s", "status_period_s", "duration_s")
+_ABOVE_ZERO = (
+    "period_s",
+    "heartbeat_period_s",
+    "clock_period_s",
+    "attitude_period_s",
+    "status_period_s",
+    "airspeed_period_s",
+    "duration_s",
+)
 _ANY_SIGN = (
     "_error_m",
     "_error_rad",
@@ -82,15 +90,17 @@ def _table(parameters: type, *, many: bool = False) -> Table:
     for one in fields(parameters):
         convert = checked(one.name, hints[one.name])
         keys[one.name] = (one.name, convert)
-        if one.name.endswith("_rad"):
-            keys[one.name.removesuffix("_rad") + "_deg"] = (one.name, _radians(convert))
+        for radians, degrees in (("_rad", "_deg"), ("_radps", "_degps")):
+            if one.name.endswith(radians):
+                keys[one.name.removesuffix(radians) + degrees] = (one.name, _radians(convert))
     return Table(keys, many=many)
 
 
 GPS = _table(GpsParameters)
 RADAR = _table(RadarParameters, many=True)
+IMU = _table(ImuParameters)
 SAY = _table(SayParameters)
-KINDS: Mapping[type, Table] = {GpsParameters: GPS, RadarParameters: RADAR, SayParameters: SAY}
+KINDS: Mapping[type, Table] = {GpsParameters: GPS, ImuParameters: IMU, RadarParameters: RADAR, SayParameters: SAY}
 
 
 def with_fields(parameters: Group, changed: Mapping[str, Any]) -> Group:

@@ -13,7 +13,7 @@ from sim.earth import Flown, fly
 from sim.faults import Fault
 from sim.faulty_sensors import clock_error_s
 from sim.paths import Path
-from sim.sensors import GpsParameters, RadarParameters
+from sim.sensors import GpsParameters, ImuParameters, RadarParameters
 
 Floats = NDArray[np.float64]
 
@@ -83,6 +83,7 @@ class Scene:
     gps: GpsParameters
     radars: tuple[SceneRadar, ...]
     say: SayParameters = SayParameters()
+    imu: ImuParameters = ImuParameters()
     faults: tuple[Fault, ...] = ()
 
     @property

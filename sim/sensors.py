@@ -80,6 +80,19 @@ class RadarParameters:
 
 
 @dataclass(frozen=True, slots=True)
+class ImuParameters:
+    """An aircraft's inertial unit, one sigma; noise in a root Hz. A rate of 0: it tells nothing."""
+
+    rate_hz: float = 0.0
+    rate_bias_radps: float = math.radians(0.03)
+    force_bias_mps2: float = 0.03
+    rate_noise_radps: float = math.radians(0.01)
+    force_noise_mps2: float = 0.005
+    airspeed_sigma_mps: float = 0.3  # of what has wings
+    airspeed_period_s: float = 0.1
+
+
+@dataclass(frozen=True, slots=True)
 class GpsMeasured:
     """Reports (..., n) of a position source, velocities (..., n, 3), and when each is valid and heard."""
 

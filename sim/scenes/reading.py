@@ -10,14 +10,14 @@ from gateway.settings import Site, SiteError
 from gateway.settings.instants import instant_ns
 from gateway.settings.reading import check_tables, hint, line_of, parse_site, read_row, read_site, read_table, read_toml
 from sim.faults import Fault
-from sim.parameter_tables import GPS, RADAR, SAY, with_fields
+from sim.parameter_tables import GPS, IMU, RADAR, SAY, with_fields
 from sim.scenes.schemes import SCHEMES
 from sim.scenes.script import Script, Vehicle, Waypoint
 from sim.scenes.tables import DRAWN, FAULTS, SCENE, VEHICLE, WAYPOINT
 from sim.scenes.ways import WORDS
 from sim.sensors import GpsParameters
 
-_TABLES = ("scene", "site", "gps", "say", "radar", "vehicle", "fault", *SCHEMES)
+_TABLES = ("scene", "site", "gps", "imu", "say", "radar", "vehicle", "fault", *SCHEMES)
 
 
 def read_scene(path: Path) -> Script:
@@ -60,6 +60,7 @@ def parse_scene(text: str, origin: str, folder: Path, name: str) -> Script:
         start_ns=None if start is None else instant_ns(start),
         site=_site(document, site_file, text, origin, folder),
         gps=gps,
+        imu=(rows("imu", IMU) or [{}])[0],
         say=(rows("say", SAY) or [{}])[0],
         radars=tuple(rows("radar", RADAR)),
         vehicles=vehicles,

@@ -41,7 +41,7 @@ class Vehicle:
 
 @dataclass(frozen=True, slots=True)
 class Script:
-    """A scene as it is written. `gps`, `say` and `radars` hold the fields that are set, one entry a radar.
+    """A scene as it is written. `gps`, `imu`, `say` and `radars` hold the fields that are set, one entry a radar.
 
     `radar_count` None: the site's radars, or as many as are written, at least one.
     """
@@ -56,6 +56,7 @@ class Script:
     site: Site | None = None
     radar_count: int | None = None
     gps: Mapping[str, Any] = field(default_factory=dict)
+    imu: Mapping[str, Any] = field(default_factory=dict)
     say: Mapping[str, Any] = field(default_factory=dict)
     radars: tuple[Mapping[str, Any], ...] = ()
     vehicles: tuple[Vehicle, ...] = ()

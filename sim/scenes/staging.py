@@ -15,7 +15,7 @@ from sim.scenes.placement import as_the_site_says, place_radars
 from sim.scenes.schemes import SCHEMES
 from sim.scenes.script import Script, Vehicle
 from sim.scenes.ways import beside, way_of
-from sim.sensors import GpsParameters, RadarParameters
+from sim.sensors import GpsParameters, ImuParameters, RadarParameters
 
 FOLLOWING_S = 90.0  # from one aircraft to the next where a scene has more than are written
 
@@ -53,6 +53,7 @@ def stage(
     written = SceneParameters(
         gps=with_fields(GpsParameters(), script.gps),
         radars=_radars(script, site),
+        imu=with_fields(ImuParameters(), script.imu),
         say=with_fields(SceneParameters().say, script.say),
         duration_s=_duration_s(script, placed),
     )
@@ -73,6 +74,7 @@ def stage(
         gps=parameters.gps,
         radars=tuple(replace(radar, key=(keys or {}).get(radar.site.number)) for radar in radars),
         say=parameters.say,
+        imu=parameters.imu,
         faults=script.faults,
     )
 
