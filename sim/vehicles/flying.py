@@ -14,6 +14,8 @@ from sim.vehicles.body import Body
 from sim.vehicles.missions import Mission
 from sim.vehicles.motion import Answer, Home, Moment, Order, Progress, Vector
 from sim.vehicles.piloting import DECIDES_EVERY_S, Pilot
+from sim.vehicles.rotorcraft import HELI, Rotorcraft, RotorcraftParameters
+from sim.vehicles.rotorcraft_pilot import RotorcraftPilot
 from sim.vehicles.wind import Wind, WindParameters
 
 STEP_S = 0.02
@@ -156,6 +158,30 @@ def _aeroplane_settings(parameters: AeroplaneParameters) -> dict[str, float]:
         "WP_LOITER_RAD": round(0.16 * cruise * cruise, -1),
         "WP_RADIUS": max(25.0, cruise),
     }
+
+
+def rotorcraft(
+    home: Home,
+    items: tuple[MissionItem, ...] = (),
+    *,
+    parameters: RotorcraftParameters | None = None,
+    kind: int = QUADROTOR,
+    wind: WindParameters | None = None,
+    seed: int = 0,
+    system: int = 1,
+) -> Flyer:
+    """A multirotor or helicopter that stands at home with a mission (`items`, without home) and waits to be armed."""
+    body, mission = Body.at(home), Mission(with_home(home, items))
+    craft = Rotorcraft(parameters or (HELI if kind == HELICOPTER else RotorcraftParameters()), body, home.height_m)
+    settings = {
+        "LAND_ALT_LOW": 1000.0,
+        "LAND_SPEED": 50.0,
+        "RTL_ALT": 3000.0,
+        "WPNAV_RADIUS": 200.0,
+        "WPNAV_SPEED": 100.0 * craft.parameters.cruise_mps,
+    }
+    pilot = RotorcraftPilot(home, body, mission, settings, craft=craft)
+    return Flyer(kind, home, craft, pilot, Wind(wind or WindParameters(), stream(seed, "wind", system)))
 
 
 def with_home(home: Home, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:

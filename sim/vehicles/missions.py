@@ -73,6 +73,10 @@ class Mission:
         self.reached.append(self.current)
         return self.advance()
 
+    def following(self) -> MissionItem | None:
+        """The place after the current one, jumps left aside."""
+        return next((one for one in self.items[self.current + 1 :] if one.command <= LAST_NAVIGATION), None)
+
     def landing_sequence(self) -> int | None:
         """The number of the item at which a landing begins (DO_LAND_START); None where the mission has none."""
         return next((at for at, one in enumerate(self.items) if one.command == LANDING_SEQUENCE), None)

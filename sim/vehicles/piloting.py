@@ -50,6 +50,7 @@ class Pilot(ABC, Generic[C]):
     _turned_rad: float = 0.0
 
     speed_setting: ClassVar[str]  # the parameter that DO_CHANGE_SPEED changes
+    speed_unit_mps: ClassVar[float] = 1.0
     modes: ClassVar[dict[str, int]]  # ArduPilot's number of each mode
 
     def __post_init__(self) -> None:
@@ -125,7 +126,7 @@ class Pilot(ABC, Generic[C]):
     def _change_speed(self, speed_mps: float) -> Answer:
         if not 0.0 < speed_mps < math.inf:
             return Answer("denied", "a speed is above 0 m/s")
-        self.settings[self.speed_setting] = speed_mps
+        self.settings[self.speed_setting] = speed_mps / self.speed_unit_mps
         return ACCEPTED
 
     def _next_item(self) -> MissionItem | None:
