@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import sys
 
 
 def main() -> None:
     """Run `talkdown`; exits 0 done, 1 failed while running, 2 wrong usage or site file."""
-    gc.set_threshold(
-        20_000, 10, 10
-    )  # hardly anything here is cyclic: looking for it less often saves a tenth of all time
+    from gateway.runtime.interpreter import collect_rarely
+
+    collect_rarely()
     from gateway.cli.app import run
 
     code = run(sys.argv[1:])

@@ -110,11 +110,17 @@ def expanded(paths: Sequence[Path], crew: Crew) -> list[Path]:
 
 
 def sessions_of(paths: Sequence[Path], crew: Crew) -> list[Path] | None:
-    """The sessions that paths name, where they name many: folders of sessions, or several sessions; else None."""
+    """The sessions that paths name, where they name many: folders of sessions, or several sessions; else None.
+
+    Raises UsageError for what is neither.
+    """
     from gateway.runtime.sessions import is_session
 
-    if not any(path.is_dir() for path in paths) or (len(paths) == 1 and is_session(paths[0])):
+    if len(paths) == 1 and (is_session(paths[0]) or not paths[0].is_dir()):
         return None
+    for path in paths:
+        if not path.is_dir():
+            raise UsageError(f"{path} is no session: it is no folder.")
     return expanded(paths, crew)
 
 

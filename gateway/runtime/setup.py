@@ -50,5 +50,6 @@ class Setup:
     takes_up: bool = False  # what the last live session of this site, in the archive, has learnt of its radars
     is_watched: bool = True  # False: drawn in large batches, for a replay as fast as it goes that nobody looks at
     smooth: bool = False  # make smoothed tracks when it is over
-    name: str = ""  # of the session's folder; without one the site's
+    name: str = ""  # of the session's folder, after when it began; without one the site's
+    folder_name: str = ""  # the whole name of the session's folder, where it is decided
     command: tuple[str, ...] = ()
