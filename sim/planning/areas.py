@@ -40,7 +40,7 @@ class Area:
         if self.radius_m is None:
             return np.concatenate([self.corners_m, self.corners_m[:1]])
         angle = np.linspace(0.0, 2.0 * np.pi, 73)
-        return self.corners_m[0] + self.radius_m * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        return np.asarray(self.corners_m[0] + self.radius_m * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
 
     def middle(self) -> Floats:
         """A point (2,) about which ways go round it on one side or the other."""

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
-LAMBDA_M4 = 3_000.0**4  # at 3 km, the least distance that threats have from each other, a metre counts as two
+LAMBDA_M4 = 2_000.0**4  # 16 km4: at 2 km a metre counts as two
 NEAREST_M = 1.0  # nobody is nearer to a threat than this: J stays finite
 STEP_M = 25.0  # between a curve's points where it is priced: at 250 m from a threat 0.3 % off
 
@@ -41,7 +41,7 @@ class Threats:
     def square(self, place_m: Floats) -> Floats:
         """Squares of the distances (..., n) from places (..., 2)."""
         aside = place_m[..., None, :] - self.place_m
-        return np.maximum((aside * aside).sum(axis=-1) + self.below_m**2, NEAREST_M**2)
+        return np.asarray(np.maximum((aside * aside).sum(axis=-1) + self.below_m**2, NEAREST_M**2))
 
     def density(self, place_m: Floats) -> Floats:
         """Sum of 1/d^4 over the threats, 1/m^4, at places (..., 2)."""

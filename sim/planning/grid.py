@@ -21,11 +21,12 @@ Whole = NDArray[np.int64]
 CELLS = 110  # along the longer side
 KINDS = 5  # ways of different kinds that are looked into
 WORTH = 1.3  # those that cost at most so many times as much as the best
-_MOVES = np.array(
-    [(1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (1, 2), (2, -1), (1, -2)]
-    + [(3, 1), (1, 3), (3, -1), (1, -3), (3, 2), (2, 3), (3, -2), (2, -3)]
-)  # and their opposites
-_SAMPLES, _WEIGHTS = np.array([0.0, 0.25, 0.5, 0.75, 1.0]), np.array([7.0, 32.0, 12.0, 32.0, 7.0]) / 90.0  # Boole's rule
+_KNIGHTS = ((1, 0), (1, 1), (2, 1), (1, 2), (3, 1), (1, 3), (3, 2), (2, 3))
+_MOVES = np.array([move for x, y in _KNIGHTS for move in ((x, y), (y, -x))])  # in half of all directions
+_SAMPLES, _WEIGHTS = (
+    np.array([0.0, 0.25, 0.5, 0.75, 1.0]),
+    np.array([7.0, 32.0, 12.0, 32.0, 7.0]) / 90.0,
+)  # Boole's rule
 
 
 def ways(task: Task, cells: int = CELLS, kinds: int = KINDS) -> list[Floats]:
@@ -64,10 +65,10 @@ def _graph(task: Task, cells: int) -> tuple[Floats, csr_array]:
         begin = np.flatnonzero(within)
         begins.append(begin)
         ends.append(begin + across * counts[1] + along)
-    for end in (len(node_m) - 2, len(node_m) - 1):
-        near = np.flatnonzero(np.hypot(*(node_m - node_m[end]).T) < 3.0 * step)
-        near = near[near != end]
-        begins.append(np.full(len(near), end))
+    for last in (len(node_m) - 2, len(node_m) - 1):
+        near = np.flatnonzero(np.hypot(*(node_m - node_m[last]).T) < 3.0 * step)
+        near = near[near != last]
+        begins.append(np.full(len(near), last))
         ends.append(near)
     begin, end = np.concatenate(begins), np.concatenate(ends)
     cost = _costs(task, node_m[begin], node_m[end])
@@ -84,13 +85,13 @@ def _costs(task: Task, begin_m: Floats, end_m: Floats) -> Floats:
         place = begin_m + share * (end_m - begin_m)
         cost += weight * task.price(place)
         cost[outside(task.areas, place) <= 0.0] = np.inf
-    return np.maximum(cost * length, 1e-9)
+    return np.asarray(np.maximum(cost * length, 1e-9))
 
 
 def _kinds(node_m: Floats, before: Whole, about_m: Floats) -> Whole:
     """Full turns (n, k) about each place of the cheapest way through each node, against one of them."""
     turned = _turned(node_m, before[0], about_m) - _turned(node_m, before[1], about_m)
-    return np.rint((turned - turned[-1]) / (2.0 * np.pi)).astype(np.int64)
+    return np.asarray(np.rint((turned - turned[-1]) / (2.0 * np.pi)), dtype=np.int64)
 
 
 def _turned(node_m: Floats, before: Whole, about_m: Floats) -> Floats:
@@ -105,7 +106,7 @@ def _turned(node_m: Floats, before: Whole, about_m: Floats) -> Floats:
     while not np.array_equal(further := parent[parent], parent):
         turned = turned + turned[parent]
         parent = further
-    return turned
+    return np.asarray(turned)
 
 
 def _path(node_m: Floats, before: Whole, through: int) -> Floats:
@@ -116,4 +117,4 @@ def _path(node_m: Floats, before: Whole, through: int) -> Floats:
         while (node := int(tree[node])) >= 0:
             nodes.append(node)
         halves.append(nodes)
-    return node_m[halves[0][::-1] + halves[1][1:]]
+    return np.asarray(node_m[halves[0][::-1] + halves[1][1:]])

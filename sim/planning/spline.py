@@ -42,7 +42,7 @@ class Bent:
 
 
 @dataclass(frozen=True, slots=True)
-class _Basis:
+class Basis:
     """Values and two derivatives (m, n) of n basis functions at m parameters, and the quadrature's weights (m,)."""
 
     value: Floats
@@ -52,19 +52,24 @@ class _Basis:
 
 
 @cache
-def _basis(controls: int, dense: bool) -> _Basis:
-    """For a clamped spline over [0, 1]."""
+def clamped_basis(controls: int) -> Basis:
+    """A clamped spline over [0, 1] at even parameters, ends included; without quadrature."""
+    return _basis(controls, np.linspace(0.0, 1.0, (controls - DEGREE) * _DENSE + 1), np.zeros(0))
+
+
+@cache
+def _quadrature(controls: int) -> Basis:
+    """The same at the points of Gauss's quadrature in each span."""
     spans = controls - DEGREE
-    inner = np.linspace(0.0, 1.0, spans + 1)
-    knots = np.concatenate([np.zeros(DEGREE), inner, np.ones(DEGREE)])
-    if dense:
-        at, weight = np.linspace(0.0, 1.0, spans * _DENSE + 1), np.zeros(0)
-    else:
-        node, share = np.polynomial.legendre.leggauss(_GAUSS)
-        at = ((np.arange(spans)[:, None] + 0.5 * (node + 1.0)) / spans).ravel()
-        weight = np.tile(0.5 * share / spans, spans)
-    spline = BSpline(knots, np.eye(controls), DEGREE)
-    return _Basis(spline(at), spline.derivative(1)(at), spline.derivative(2)(at), weight)
+    node, share = np.polynomial.legendre.leggauss(_GAUSS)
+    at = ((np.arange(spans)[:, None] + 0.5 * (node + 1.0)) / spans).ravel()
+    return _basis(controls, at, np.tile(0.5 * share / spans, spans))
+
+
+def _basis(controls: int, at: Floats, weight: Floats) -> Basis:
+    inner = np.linspace(0.0, 1.0, controls - DEGREE + 1)
+    spline = BSpline(np.concatenate([np.zeros(DEGREE), inner, np.ones(DEGREE)]), np.eye(controls), DEGREE)
+    return Basis(spline(at), spline.derivative(1)(at), spline.derivative(2)(at), weight)
 
 
 def bend(task: Task, way_m: Floats) -> Bent:
@@ -120,7 +125,7 @@ class _Search:
         at = np.linspace(0.0, station[-1], len(self.fixed))
         controls = np.stack([np.interp(at, station, way_m[:, axis]) for axis in (0, 1)], axis=-1) / _UNIT_M
         free = np.einsum("nak,na->k", self.moves, controls - self.fixed)
-        return np.clip(free, *np.array(self.bounds(), dtype=np.float64).T)
+        return np.asarray(np.clip(free, *np.array(self.bounds(), dtype=np.float64).T))
 
     def bounds(self) -> list[tuple[float, float]]:
         """The box of each control point, in which its curve stays, and rays that point forward."""
@@ -131,12 +136,12 @@ class _Search:
 
     def controls(self, free: Floats) -> Floats:
         """The control points (n, 2), km."""
-        return self.fixed + self.moves @ free
+        return np.asarray(self.fixed + self.moves @ free)
 
     def bent(self, free: Floats) -> Bent:
         """The curve, checked at many points."""
         controls = self.controls(free)
-        basis = _basis(len(controls), dense=True)
+        basis = clamped_basis(len(controls))
         place = basis.value @ controls * _UNIT_M
         place[0], place[-1] = self.task.start_m, self.task.goal_m
         first, second = basis.first @ controls, basis.second @ controls
@@ -148,7 +153,7 @@ class _Search:
     def cost(self, free: Floats, weight: float) -> tuple[float, Floats]:
         """J in km, with what too narrow turns and areas cost, and its derivative by what is free."""
         controls = self.controls(free)
-        basis = _basis(len(controls), dense=False)
+        basis = _quadrature(len(controls))
         place, first, second = basis.value @ controls, basis.first @ controls, basis.second @ controls
         speed = np.maximum(np.hypot(first[:, 0], first[:, 1]), 1e-6)
         rate, by_place = self._rate(place, weight)
@@ -183,4 +188,8 @@ class _Search:
         over = np.maximum(np.abs(bent) - 1.0, 0.0)
         slope = weight * 2.0 * over * np.sign(bent) * radius / speed**3
         across = np.stack([second[:, 1], -second[:, 0]], axis=-1) - (3.0 * cross / speed**2)[:, None] * first
-        return weight * over**2, slope[:, None] * across, slope[:, None] * np.stack([-first[:, 1], first[:, 0]], axis=-1)
+        return (
+            weight * over**2,
+            slope[:, None] * across,
+            slope[:, None] * np.stack([-first[:, 1], first[:, 0]], axis=-1),
+        )

@@ -69,7 +69,7 @@ def anneal(triangles_m: Floats, objective: Objective, chance: np.random.Generato
             best, least = np.where(better, tried, best), np.where(better, there, least)
         temperature *= COOLING
     chosen = least.reshape(-1, CHAINS).argmin(axis=1) + CHAINS * np.arange(len(triangles_m))
-    return shape.places(best)[chosen]
+    return np.asarray(shape.places(best)[chosen])
 
 
 def exact(triangles_m: Floats, objective: Objective) -> Floats:
@@ -91,7 +91,7 @@ def _smallest(triangles_m: Floats, objective: Objective) -> Floats:
         best = np.take_along_axis(tried, np.broadcast_to(chosen, (2, 1, len(chosen))), axis=1)
         width *= _SHRINKS
     least = energy(objective, shape.squares(best[:, 0])).reshape(-1, _STARTS**2).argmin(axis=1)
-    return shape.places(best[:, 0])[least + _STARTS**2 * np.arange(len(triangles_m))]
+    return np.asarray(shape.places(best[:, 0])[least + _STARTS**2 * np.arange(len(triangles_m))])
 
 
 def _clearest(triangles_m: Floats) -> Floats:
@@ -113,7 +113,7 @@ def _clearest(triangles_m: Floats) -> Floats:
     rounding = 1e-9 * (sides**2).sum(axis=-1)
     inside = np.isfinite(places).all(axis=-1) & (left * turn >= -rounding).all(axis=-1)
     clear = np.where(inside, (aside**2).sum(axis=-1).min(axis=-1), -np.inf)
-    return places[np.arange(len(places)), clear.argmax(axis=1)]
+    return np.asarray(places[np.arange(len(places)), clear.argmax(axis=1)])
 
 
 def _meeting(one: Floats, other: Floats, third: Floats, fourth: Floats) -> Floats:
@@ -157,9 +157,9 @@ class _Triangles:
         y = share[0] * self.y[1] + share[1] * self.y[2]
         between = (3, *(1,) * (share.ndim - 2), -1)
         across, along = x - self.x.reshape(between), y - self.y.reshape(between)
-        return across * across + along * along
+        return np.asarray(across * across + along * along)
 
     def places(self, share: Floats) -> Floats:
         """Points (k, 2) in m."""
         x, y = (share[0] * one[1] + share[1] * one[2] for one in (self.x, self.y))
-        return self.origin_m + self.scale_m[:, None] * np.stack([x, y], axis=-1)
+        return np.asarray(self.origin_m + self.scale_m[:, None] * np.stack([x, y], axis=-1))
