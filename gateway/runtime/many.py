@@ -88,15 +88,13 @@ def in_processes(job: Job[Thing, Any], things: Sequence[Thing], workers: int) ->
             for end in wait(list(busy)):
                 one = busy[end]  # type: ignore[index]
                 place, attempt = one.leave()
-                try:
-                    yield place, one.end.recv()
-                except (EOFError, ConnectionError):
+                outcome, goes_on = one.hear()
+                if not goes_on:
                     crew[crew.index(one)] = _Worker(job)
-                    how = one.buried()
-                    if attempt < _ATTEMPTS:
-                        waiting.appendleft((place, attempt + 1))
-                    else:
-                        yield place, Outcome(failure=_died(how))
+                if outcome is None and attempt < _ATTEMPTS:
+                    waiting.appendleft((place, attempt + 1))
+                else:
+                    yield place, outcome or Outcome(failure=_died(one.buried()))
     finally:
         for one in crew:
             one.dismiss()
@@ -132,9 +130,16 @@ class _Worker:
         at, self.at = self.at, None
         return at
 
+    def hear(self) -> tuple[Outcome[Any] | None, bool]:
+        """What came of it, None if the process died on it; and whether the process goes on."""
+        try:
+            told: tuple[Outcome[Any], bool] = self.end.recv()
+        except (EOFError, ConnectionError):
+            return None, False
+        return told
+
     def buried(self) -> int:
         """How a process that died has ended: minus the signal, or its exit code."""
-        self.end.close()
         self._process.join()
         return self._process.exitcode or 0
 
@@ -172,10 +177,10 @@ def _serve(end: Connection, job: Job[Any, Any]) -> None:
         try:
             outcome = job.on(thing)
         except Exception as error:
-            end.send(Outcome(failure=program_error(error)))
+            end.send((Outcome(failure=program_error(error)), False))
             raise
         with contextlib.suppress(ConnectionError):
-            end.send(outcome)
+            end.send((outcome, True))
 
 
 def program_error(error: BaseException) -> str:
