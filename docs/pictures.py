@@ -92,6 +92,9 @@ def main() -> None:
         talkdown("simulate", "conflicts", "--set", "aircraft=10", "--set", "duration_s=420", *few, *MAX, work / "near")
         talkdown("replay", only_session(work / "near"), "--viewer", "none", "--archive", work / "told")
         draw(only_session(work / "told") / "session.rrd", "conflict", "--at", "0.64", *SCENE)
+        talkdown("simulate", "spoofed", *MAX, work / "false")
+        talkdown("replay", only_session(work / "false"), "--viewer", "none", "--archive", work / "denied")
+        draw(only_session(work / "denied") / "session.rrd", "spoofed", "--at", "0.72")
         published = work / "published.toml"
         published.write_text(PUBLISHED, encoding="utf-8")
         talkdown("simulate", "approach", "--site", published, *few, *MAX, work / "one")

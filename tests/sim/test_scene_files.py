@@ -1,16 +1,18 @@
 """Scene files: what they may say, what is said of them when they are wrong, and those that come along."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from adapters.mavlink_frames import message_name, parse
-from gateway.settings import SiteError
+from gateway.settings import DEMO_SITE, SiteError, format_site
 from sim.events import events
 from sim.scene import Scene
 from sim.scenes import build_scene, find_scene, parse_scene, scene_names, scenes_in, stage
+from sim.scenes.tables import FAULTS
 
 HEAD = '[scene]\ndescription = "A test."\nduration_s = 20.0\n'
 VEHICLE = '[[vehicle]]\nroute = "approach"\n'
@@ -192,3 +194,13 @@ def test_an_inertial_unit_tells_what_is_felt() -> None:
     assert np.mean(felt, axis=0) == pytest.approx([0.0, 0.0, -9.77, 0.0, 0.0, 0.0], abs=0.01)
     huds = [np.frombuffer(frame.payload[:4], "<f4")[0] for frame in found if message_name(frame.message) == "VFR_HUD"]
     assert np.mean(huds) == pytest.approx(130.0 * (1.0 - 2.2558e-5 * 1700.0) ** 2.128, abs=0.3)
+
+
+def test_the_examples_of_the_documentation_can_be_staged(tmp_path: Path) -> None:
+    """The whole file of docs/scenes.md, and its faults, of which there is one of each kind."""
+    text = (Path(__file__).parents[2] / "docs" / "scenes.md").read_text("utf-8")
+    whole, faults = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    (tmp_path / "field.toml").write_text(format_site(DEMO_SITE))
+    assert len(staged(whole, tmp_path).aircraft) == 2
+    many = parse_scene(HEAD + VEHICLE + faults, "docs", tmp_path, "docs").faults
+    assert {type(one) for one in many} == {known.make for known in FAULTS.values()}
