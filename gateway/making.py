@@ -86,17 +86,6 @@ class Making:
             return rows
         return [replace(row, wind_mps=self.reckoners.wind_mps(row.aircraft)) for row in rows]
 
-    def _with_reckoning(self, health: Health) -> Health:
-        """What vehicles say, with what dead reckoning has found of them."""
-        if not self.reckoners.by_aircraft:
-            return health
-        vehicles = []
-        for one in health.vehicles:
-            found = self.reckoners.of(one.aircraft, self.now or 0)
-            readings, words = found.shown() if found is not None else ((), ())
-            vehicles.append(replace(one, readings=(*one.readings, *readings), words=(*one.words, *words)))
-        return replace(health, vehicles=tuple(vehicles))
-
     def _scene(self) -> Scene:
         return Scene(self.tracks, self._spans, self.options, self.predicting.headings)
 
@@ -170,7 +159,7 @@ class Making:
             fuse=replace(table, settled=tuple(self.settled)),
             predict=predict.table(self.forecasts, self.frame, self.rounds),
             truth=tuple(observation for observation in observations if isinstance(observation, Truth)),
-            health=replace(self._with_reckoning(health), sources=(*health.sources, own)),
+            health=replace(health, sources=(*health.sources, own)),
             events=tuple(self.events),
             reckoned=tuple(self.reckoned),
         )

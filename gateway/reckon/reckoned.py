@@ -55,8 +55,8 @@ class Reckoned:
         return tuple(readings), (("positions", denied),)
 
 
-def reckoned(aircraft: str, tip: Tip, at: int) -> Reckoned:
-    """A tip carried on, or back, to an instant."""
+def reckoned(aircraft: str, tip: Tip, at: int, denied: int) -> Reckoned:
+    """A tip carried on, or back, to an instant; `denied`: why the vehicle's positions are refused by now."""
     ahead_ns = at - int(tip.cell[0]) * CELL_NS
     ahead_s = ahead_ns / SECOND
     motion, accelerated = tip.state.motion, tip.accelerated_mps2[0]
@@ -78,7 +78,7 @@ def reckoned(aircraft: str, tip: Tip, at: int) -> Reckoned:
         np.sqrt(variance[3:6] + jerked**2),
         wind_mps(tip),
         math.sqrt(float(tip.scatter_m2[0])),
-        int(tip.denied[0]),
+        denied,
         int(tip.heard[0]) * CELL_NS,
         bool(tip.cell[0] - tip.began[0] >= TRUSTED_AFTER),
         ahead_s,

@@ -188,7 +188,7 @@ class Reckoners:
         if reckoner is None or tip is None or at - int(tip.cell[0]) * CELL_NS > AHEAD_NS:
             return None
         earlier = next((one for one in reversed(reckoner.tips) if int(one.cell[0]) * CELL_NS <= at), reckoner.tips[0])
-        return replace(reckoned(aircraft, earlier, at), denied=self.denied(aircraft))
+        return reckoned(aircraft, earlier, at, int(tip.denied[0]))
 
     def follows(self, aircraft: str, at: int) -> bool:
         """Whether a vehicle will go on to this instant later in its second."""

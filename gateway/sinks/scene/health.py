@@ -16,11 +16,15 @@ import rerun as rr
 
 from gateway.observation import FlightPlan
 from gateway.picture import Picture, SourceHealth, VehicleHealth
+from gateway.reckon import Reckoned
 from gateway.sinks.scene.entry import Always, Entry, entity, once
 from gateway.sinks.scene.lately import BEFORE_ALL, Lately
 from gateway.sinks.scene.samples import Sample, plotted
 
 SAMPLE_NS = 1_000_000_000  # people read it: once a second
+RECKONED_NS = (
+    3 * SAMPLE_NS
+)  # what dead reckoning has found is told each second, of a crowd somewhat later; then it is old
 VEHICLES_ABREAST = 5  # columns that can be read side by side
 VEHICLES_AT_MOST = 25
 _SERIES_AT_MOST = 4096  # entities whose series are remembered; one that is forgotten numbers its series anew
@@ -38,6 +42,8 @@ class HealthScene:
         self._tables: dict[str, str] = {}
         self._plans: dict[str, str] = {}  # what each aircraft's plan holds; also those that came from a file
         self._planned: Lately[str] = Lately(self._plans.pop)
+        self._reckoned: dict[str, Reckoned] = {}  # what dead reckoning has last found of each aircraft
+        self._found: Lately[str] = Lately(self._reckoned.pop)
 
     def entries(self, pictures: Sequence[Picture]) -> list[Entry]:
         """What these pictures add."""
@@ -45,12 +51,16 @@ class HealthScene:
         samples: list[Sample] = []
         for picture in pictures:
             self._take_plans(picture)
+            for one in picture.reckoned:
+                self._reckoned[one.aircraft] = one
+                self._found.is_new(one.aircraft, picture.now)
             is_told = picture.health.sources or picture.health.vehicles
             if is_told and not 0 <= picture.now - self._sampled < SAMPLE_NS:
                 self._sampled = picture.now
                 samples += _of_sources(picture)
-                samples += self._of_vehicles(picture)
-                entries += self._changed(picture, VEHICLES, vehicles_table(self._with_plans(picture)))
+                vehicles = [self._with_reckoned(one, picture.now) for one in picture.health.vehicles]
+                samples += self._of_vehicles(picture, vehicles)
+                entries += self._changed(picture, VEHICLES, vehicles_table(self._with_plans(picture, vehicles)))
                 entries += self._changed(picture, SOURCES, sources_table(picture.health.sources))
         return plotted(samples, self._named) + entries
 
@@ -61,20 +71,28 @@ class HealthScene:
                 self._plans[plan.aircraft] = ", ".join(kind if n == 1 else f"{n} {kind}s" for kind, n in kinds.items())
                 self._planned.is_new(plan.aircraft, picture.now)
 
-    def _with_plans(self, picture: Picture) -> list[VehicleHealth]:
+    def _with_reckoned(self, vehicle: VehicleHealth, now: int) -> VehicleHealth:
+        """What a vehicle says, with what dead reckoning has found of it lately."""
+        found = self._reckoned.get(vehicle.aircraft)
+        if found is None or not 0 <= now - found.at < RECKONED_NS:
+            return vehicle
+        readings, words = found.shown()
+        return replace(vehicle, readings=(*vehicle.readings, *readings), words=(*vehicle.words, *words))
+
+    def _with_plans(self, picture: Picture, vehicles: Sequence[VehicleHealth]) -> list[VehicleHealth]:
         """The vehicles, each with what its flight plan holds among its words."""
         found = []
-        for vehicle in picture.health.vehicles:
+        for vehicle in vehicles:
             if plan := self._plans.get(vehicle.aircraft):
                 self._planned.is_new(vehicle.aircraft, picture.now)
                 vehicle = replace(vehicle, words=(*vehicle.words, ("flight plan", plan)))
             found.append(vehicle)
         return found
 
-    def _of_vehicles(self, picture: Picture) -> list[Sample]:
+    def _of_vehicles(self, picture: Picture, vehicles: Sequence[VehicleHealth]) -> list[Sample]:
         """What vehicles last said in numbers, and how well their times are known."""
         samples = []
-        for vehicle in picture.health.vehicles:
+        for vehicle in vehicles:
             name = vehicle.aircraft
             times = {f"{name} {what}, ms": 1e3 * value for what, value in _times_s(vehicle).items()}
             told = {entity("health", "time", name): times}

@@ -7,10 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
 from gateway.picture import Health, Picture, SourceHealth, VehicleHealth
+from gateway.reckon import NOTHING, Reckoned
 from gateway.settings import DEMO_SITE
 from gateway.sinks.rerun import RerunSink
 from gateway.sinks.scene.health import SOURCES, VEHICLES, HealthScene, sources_table, unit_part, vehicles_table
@@ -80,6 +82,23 @@ def test_a_reading_that_is_told_later_gets_a_series_of_its_own_and_moves_no_othe
     values = [row["Scalars:scalars"] for row in entities["/health/reading/mps/mavlink\\:1"]]
     assert values[0][0] == 5.0
     assert values[-1] == [6.0, 1.0]
+
+
+def test_what_dead_reckoning_found_is_among_a_vehicles_readings_until_it_is_old(pictures):
+    first, last = pictures(5.0)[0], pictures(5.0)[-1]
+    (vehicle,) = first.health.vehicles
+    sigma, wind = np.array([3.0, 3.0, 5.0]), np.array([0.0, -4.0])
+    place = (vehicle.aircraft, first.now, 0.7, 0.2, 600.0, np.zeros(3), sigma, np.ones(3))
+    found = Reckoned(*place, wind, 1.0, NOTHING, first.now, True, 0.0)
+    scene = HealthScene()
+    scene.entries([replace(first, reckoned=(found,))])
+    (table,) = scene._tables[VEHICLES].split("\n\n")
+    rows = dict(cells(table))
+    assert rows["dead reckoning sigma, m"] == "3.00"
+    assert (rows["wind found, m/s"], rows["wind found from, degrees"]) == ("4.00", "90.0")
+    assert rows["positions"] == "believed"
+    scene.entries([last])
+    assert "dead reckoning" not in scene._tables[VEHICLES]
 
 
 def test_when_the_session_goes_back_in_time_health_is_drawn_on(pictures):
