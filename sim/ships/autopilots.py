@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gateway.geodesy import wrap_rad
-from sim.ships.hull import Hull, swing
+from sim.ships.hull import STEERAGE_MPS, Hull, swing
 from sim.ships.wave_filter import WaveFilter, wave_filter
 from sim.ships.waves import Waves
 
@@ -102,7 +102,7 @@ class Adaptive:
     def __call__(self, seen: Steering, step_s: float) -> tuple[Floats, Floats]:
         """The order and the helm after a step."""
         hull, speed = self.hull, seen.speed_mps
-        w = self.bandwidth_radps * speed / hull.speed_mps
+        w = self.bandwidth_radps * np.maximum(speed, STEERAGE_MPS) / hull.speed_mps
         gains = place_poles(hull.gain_at(speed), hull.lag_at(speed), w)
         return Pid(gains, hull.rudder_limit_rad)(seen, step_s)
 

@@ -19,6 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
+STEERAGE_MPS = 0.5  # slower than this a rudder does no more than at this speed, and T grows no more
+
 
 @dataclass(frozen=True, slots=True)
 class Hull:
@@ -34,11 +36,11 @@ class Hull:
 
     def gain_at(self, speed_mps: ArrayLike) -> Floats:
         """K (...) at speeds through the water (...), 1/s."""
-        return np.asarray(self.gain_per_s * np.asarray(speed_mps) / self.speed_mps)
+        return np.asarray(self.gain_per_s * np.maximum(speed_mps, STEERAGE_MPS) / self.speed_mps)
 
     def lag_at(self, speed_mps: ArrayLike) -> Floats:
         """T (...) at speeds through the water (...), s."""
-        return np.asarray(self.lag_s * self.speed_mps / np.asarray(speed_mps))
+        return np.asarray(self.lag_s * self.speed_mps / np.maximum(speed_mps, STEERAGE_MPS))
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,21 +49,41 @@ class Waves:
         return np.asarray(self.covariance - carry @ self.covariance @ carry.T)
 
 
+@dataclass(slots=True)
+class Rolling:
+    """A sea as it goes on, step by step: `now` is heading and rate, (2, ...)."""
+
+    carry: Floats
+    root: Floats
+    now: Floats
+
+    @classmethod
+    def of(cls, waves: Waves, step_s: float, fresh: Floats) -> Rolling:
+        """A sea that is steady at once, of standard normal draws (2, ...)."""
+        root = np.asarray(np.linalg.cholesky(waves.added(step_s) + 1e-18 * np.eye(2)), dtype=np.float64)
+        sigmas = np.sqrt(np.diag(waves.covariance)).reshape(2, *([1] * (fresh.ndim - 1)))
+        return cls(waves.transition(step_s), root, np.asarray(fresh * sigmas, dtype=np.float64))
+
+    def step(self, fresh: Floats) -> None:
+        """A step further, driven by standard normal draws (2, ...)."""
+        (a, b), (c, d) = self.carry
+        heading, rate = self.now
+        self.now = np.stack(
+            [
+                a * heading + b * rate + self.root[0, 0] * fresh[0],
+                c * heading + d * rate + self.root[1, 0] * fresh[0] + self.root[1, 1] * fresh[1],
+            ]
+        )
+
+
 def draw(
     waves: Waves, steps: int, shape: tuple[int, ...], step_s: float, generator: np.random.Generator
 ) -> tuple[Floats, Floats]:
     """A sea's heading (rad) and rate (rad/s), each (steps, ...), steady from the first step on."""
-    carry, root = waves.transition(step_s), np.linalg.cholesky(waves.added(step_s) + 1e-18 * np.eye(2))
     noise = generator.standard_normal((steps, 2, *shape))
     told = np.empty_like(noise)
-    now = noise[0] * np.sqrt(np.diag(waves.covariance)).reshape(2, *([1] * len(shape)))
+    sea = Rolling.of(waves, step_s, noise[0])
     for step in range(steps):
-        told[step] = now
-        fresh = noise[step]
-        now = np.stack(
-            [
-                carry[0, 0] * now[0] + carry[0, 1] * now[1] + root[0, 0] * fresh[0],
-                carry[1, 0] * now[0] + carry[1, 1] * now[1] + root[1, 0] * fresh[0] + root[1, 1] * fresh[1],
-            ]
-        )
+        told[step] = sea.now
+        sea.step(noise[step])
     return told[:, 0], told[:, 1]
