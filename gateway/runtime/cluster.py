@@ -43,7 +43,7 @@ def on_cluster(job: Job[Any, Any], things: Sequence[Any], scheduler: str) -> Gen
             for place, thing in enumerate(things)
         ]
         places = {future.key: place for place, future in enumerate(futures)}
-        for future in as_completed(futures):
+        for future in as_completed(futures, loop=client.loop):
             yield places[future.key], _outcome(future)
             future.release()
 

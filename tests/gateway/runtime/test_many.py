@@ -77,12 +77,11 @@ def test_a_cluster_ends_the_job_though_a_worker_is_killed(tmp_path: Path) -> Non
     options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "local_directory": tmp_path}
     things = [f"import time; time.sleep(0.1)\nif {number} == 7: raise KeyError('seven')" for number in range(30)]
     with distributed.LocalCluster(**options) as cluster:
-        pids = list(distributed.Client(cluster).run(os.getpid).values())
         outcomes = {}
         for place, outcome in on_cluster(CODE, things, cluster.scheduler_address):
             outcomes[place] = outcome.failure
             if len(outcomes) == 5:
-                os.kill(pids[0], 9)
+                os.kill(cluster.workers[0].pid, 9)
     assert outcomes == {number: "'seven'" if number == 7 else None for number in range(30)}
 
 
