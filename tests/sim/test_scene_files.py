@@ -185,7 +185,7 @@ def test_what_cannot_be_staged_is_said(text: str, said: str) -> None:
 
 
 def test_an_inertial_unit_tells_what_is_felt() -> None:
-    """At 50 Hz, and of a level flight eastwards: gravity less 0.02 m/s2 of Eötvös, and hardly any rate; its airspeed is that of thin air."""
+    """At 50 Hz, of a level flight eastwards: gravity less 0.02 m/s2 of Eötvös, hardly any rate; the airspeed of thin air."""
     scene = staged(HEAD + "[imu]\nrate_hz = 50.0\nforce_bias_mps2 = 0.0\nrate_bias_degps = 0.0\n" + VEHICLE)
     found = [frame for one in events(scene) if (frame := parse(one.data)) is not None]
     samples = [frame.payload for frame in found if message_name(frame.message) == "HIGHRES_IMU"]
