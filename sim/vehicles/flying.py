@@ -90,7 +90,7 @@ class Flyer:
 
     @property
     def notes(self) -> list[str]:
-        """What it has to say to people and has not said yet; whoever says it empties the list."""
+        """What it has told people so far."""
         return self.pilot.notes
 
     def order(self, order: Order) -> Answer:

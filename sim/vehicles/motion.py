@@ -131,6 +131,8 @@ class Vehicle(Protocol):
     mode: str
     is_armed: bool
     moment: Moment
+    settings: dict[str, float]  # its parameters by ArduPilot's names; stations may set them
+    notes: list[str]  # short sentences for people as they come up; it only grows
 
     @property
     def is_landed(self) -> bool:

@@ -42,7 +42,7 @@ class Pilot(ABC, Generic[C]):
     settings: dict[str, float]
     mode: str = ""
     is_armed: bool = False
-    notes: list[str] = field(default_factory=list)  # short sentences for people, as they come up
+    notes: list[str] = field(default_factory=list)  # short sentences for people, as they come up; they stay
     progress: Progress = Progress()
     plane: Plane = field(init=False)
     _begun: tuple[int, MissionItem] | None = None  # the item that is being flown
