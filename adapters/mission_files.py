@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+from adapters.mission_writing import MissionItem
 from adapters.plans import plan_point
 from gateway.observation import PlanPoint
 
@@ -58,6 +59,31 @@ def read_mission(path: Path) -> tuple[PlanPoint, ...]:
 
     Raises MissionFileError, with the line or item, for what is wrong in it or when there is no point.
     """
+    items, home = _read(path)
+    points = [point for item in items if (point := plan_point(*item[1:4], *item.place, item.parameters)) is not None]
+    if not points:
+        raise MissionFileError(f"{path} holds no item that is a place to fly to.")
+    return (*home, *points)
+
+
+def read_items(path: Path) -> tuple[tuple[MissionItem, ...], PlanPoint | None]:
+    """All items of a mission file as a vehicle takes them, without home; and home, where it has one.
+
+    Raises MissionFileError, with the line or item, for what is wrong in it or when there is no item.
+    """
+    items, home = _read(path)
+    if not items:
+        raise MissionFileError(f"{path} holds no item.")
+    read = []
+    for item in items:
+        latitude, longitude, altitude = (0.0 if math.isnan(part) else part for part in item.place)
+        parameters = (*item.parameters, math.nan)
+        read.append(MissionItem(item.command, latitude, longitude, altitude, item.frame, parameters))
+    return tuple(read), next(iter(home), None)
+
+
+def _read(path: Path) -> tuple[list[_Item], tuple[PlanPoint, ...]]:
+    """The items, and home where it has one."""
     try:
         if path.stat().st_size > _LARGEST_BYTES:
             raise MissionFileError(f"{path} is too large to be a mission.")
@@ -68,11 +94,7 @@ def read_mission(path: Path) -> tuple[PlanPoint, ...]:
     if kind is None:
         raise MissionFileError(f"{path} is no mission file: neither QGroundControl's .plan nor QGC WPL 110.")
     text = content.decode("utf-8-sig", "replace")
-    items, home = _of_plan(path, text) if kind == "plan" else _of_lines(path, text)
-    points = [point for item in items if (point := plan_point(*item[1:4], *item.place, item.parameters)) is not None]
-    if not points:
-        raise MissionFileError(f"{path} holds no item that is a place to fly to.")
-    return (*home, *points)
+    return _of_plan(path, text) if kind == "plan" else _of_lines(path, text)
 
 
 def _home(place: tuple[float, float, float]) -> tuple[PlanPoint, ...]:
