@@ -124,7 +124,7 @@ class MissionClient:
             if mission == _MISSION:
                 self._end(now)
                 self.notes.append(
-                    ("warning", f"{self.name} does not give its mission (it answers {_outcome(outcome)}).")
+                    ("warning", f"{self.name} does not give its mission (it answers {outcome_name(outcome)}).")
                 )
 
     def due(self, now: int) -> Ask | None:
@@ -170,6 +170,7 @@ class MissionClient:
         self.finished_at = now
 
 
-def _outcome(code: int) -> str:
+def outcome_name(code: int) -> str:
+    """What a MISSION_ACK says, in words."""
     named = dialect.enums["MAV_MISSION_RESULT"].get(code)
     return str(code) if named is None else named.name.removeprefix("MAV_MISSION_").lower().replace("_", " ")

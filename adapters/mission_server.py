@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 from adapters.mavlink_frames import fields
 from adapters.mission_client import ANSWER_NS, TRIES
-from adapters.mission_writing import MissionItem
+from adapters.mission_writing import MissionItem, wire_fields
 
 ACCEPTED, UNSUPPORTED_FRAME, UNSUPPORTED, NO_SPACE = 0, 2, 3, 4  # MAV_MISSION_RESULT
 INVALID_X, INVALID_Y, INVALID_Z, INVALID_SEQUENCE, DENIED, CANCELLED = 10, 11, 12, 13, 14, 15
@@ -222,19 +222,7 @@ def _give(items: Items, sequence: int, kind: int, station: Station, *, is_float:
     if kind != _MISSION or sequence >= len(items):
         return _acknowledge(INVALID_SEQUENCE, kind, station)
     item = items[sequence]
-    values: dict[str, Any] = {f"param{number}": value for number, value in enumerate(item.parameters, 1)}
-    values |= {
-        "seq": sequence,
-        "command": item.command,
-        "frame": item.frame,
-        "current": 0,
-        "autocontinue": 1,
-        "x": item.latitude_deg if is_float else round(item.latitude_deg * 1e7),
-        "y": item.longitude_deg if is_float else round(item.longitude_deg * 1e7),
-        "z": item.altitude_m,
-        "mission_type": kind,
-        **_target(station),
-    }
+    values = wire_fields(item, sequence, is_float=is_float) | _target(station)
     return Said("MISSION_ITEM" if is_float else "MISSION_ITEM_INT", values)
 
 

@@ -36,6 +36,22 @@ class MissionItem:
     parameters: tuple[float, float, float, float] = (0.0, 0.0, 0.0, math.nan)
 
 
+def wire_fields(item: MissionItem, sequence: int, *, is_float: bool = False) -> dict[str, Any]:
+    """The fields of MISSION_ITEM_INT, or with floats of MISSION_ITEM, without whom it is for."""
+    return {
+        **{f"param{number}": value for number, value in enumerate(item.parameters, 1)},
+        "seq": sequence,
+        "command": item.command,
+        "frame": item.frame,
+        "current": 0,
+        "autocontinue": 1,
+        "x": item.latitude_deg if is_float else round(item.latitude_deg * 1e7),
+        "y": item.longitude_deg if is_float else round(item.longitude_deg * 1e7),
+        "z": item.altitude_m,
+        "mission_type": 0,
+    }
+
+
 @dataclass(frozen=True, slots=True)
 class Fence:
     """An area that a vehicle keeps out of: a circle about a corner where there is a radius, else the corners' polygon.

@@ -50,7 +50,7 @@ _WRAPS_MS = 2**32 - 600_000
 
 HEARTBEAT, _read_heartbeat = fields("HEARTBEAT", "type", "autopilot")
 _BOOT_TIMES = {30: slice(0, 4), 33: slice(0, 4), 2: slice(8, 12)}  # ATTITUDE, GLOBAL_POSITION_INT, SYSTEM_TIME
-_GCS_HEARTBEAT = {
+STATION_HEARTBEAT = {
     "type": 6, "autopilot": INVALID_AUTOPILOT, "base_mode": 0, "custom_mode": 0, "system_status": 4, "mavlink_version": 3,
 }  # fmt: skip
 
@@ -153,7 +153,7 @@ class Manners:
         for peer in self._peers.values():
             if self._is_there(peer, now) and now >= peer.heartbeat_due_at and self._heartbeat:
                 peer.heartbeat_due_at = now + _HEARTBEAT_NS
-                self._send(frames, peer, ("HEARTBEAT", _GCS_HEARTBEAT), now)
+                self._send(frames, peer, ("HEARTBEAT", STATION_HEARTBEAT), now)
         for vehicle in self._vehicles.values():
             number, system, component = vehicle.key
             for ask in self._asks(vehicle, now):

@@ -76,6 +76,12 @@ class Case:
         outlines = [area.outline() for area in self.areas]
         return box_about(np.stack([*ends_m, *self.via_m]), self.threat_m, *outlines)
 
+    def with_end(self, end: str, place_deg: tuple[float, float] | None) -> Case:
+        """The same case with another "start" or "goal": latitude and longitude in degrees, None for the runway."""
+        place: End = "runway" if place_deg is None else self.plane.place_m(place_deg)
+        changed = replace(self, start=place) if end == "start" else replace(self, goal=place)
+        return replace(changed, is_placed=self.is_placed or place_deg is not None)
+
     def moved_to(self, runway: Runway) -> Case:
         """The same case with its goal on the runway: its plane touches the earth there, threats lie about it as before.
 

@@ -17,8 +17,8 @@ from gateway.settings import Runway
 from sim.planning import modern
 from sim.planning.areas import Area
 from sim.planning.case import Case, Plane
-from sim.planning.field import LAMBDA_M4, Threats, measure
-from sim.planning.task import TURN_RADIUS_M, PlanError, Route, Task
+from sim.planning.field import LAMBDA_M4, Threats, measure, resampled, stations
+from sim.planning.task import TURN_RADIUS_M, PlanError, Route, Task, box_about
 
 Floats = NDArray[np.float64]
 Planner = Callable[[Task], Route]
@@ -27,6 +27,8 @@ ASIDE_M = 20.0  # that areas are flown over and under at least
 DEPARTURE_M = 1_000.0  # straight on beyond the runway's end
 FINAL_M = 450.0  # the highest that a final begins above the runway; from further up is come down before
 LEVEL_FINAL_M = 1_500.0  # on the centreline before the glide path is met
+TAKE_OFF_M = 50.0  # above home, where a take-off ends and the climb along the route begins
+GRADIENT = 0.05  # of climbs and descents: 2.9 degrees
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +66,16 @@ class Flight:
     takes_off_m: Floats
     final: Final | None
     altitude_msl_m: float
+
+    def shown_m(self) -> Floats:
+        """A box (2, 2) about all of it, as wide as high."""
+        final = [] if self.final is None else [self.final.aims_m]
+        ends = [self.takes_off_m, *final]
+        if self.case.box_m is not None:
+            return np.stack([np.min([self.case.box_m[0], *ends], axis=0), np.max([self.case.box_m[1], *ends], axis=0)])
+        about = box_about(self.route.curve_m, self.threats.place_m, *ends, share=0.08)
+        middle, half = about.mean(axis=0), 0.5 * float((about[1] - about[0]).max())
+        return np.stack([middle - half, middle + half])
 
 
 def plan_flight(
@@ -110,7 +122,7 @@ def _is_there(area: Area, level_m: float) -> bool:
 def _on_level(case: Case, wishes: Wishes, planner: Planner, runway: Runway | None, level_m: float) -> Flight:
     threats = Threats(case.threat_m, np.nan_to_num(level_m - case.threat_height_m, nan=0.0))
     areas = tuple(area for area in case.areas if _is_there(area, level_m))
-    centreline = None if runway is None else _Centreline.of(runway, case.plane)
+    centreline = None if runway is None else _Centreline(runway, case.plane)
     home, takes_off, start, leaving = _departure(case, centreline)
     goal, arriving, final = _arrival(case, centreline, level_m)
     points = [start, *case.via_m, goal]
@@ -123,26 +135,50 @@ def _on_level(case: Case, wishes: Wishes, planner: Planner, runway: Runway | Non
     ]
     route = legs[0] if len(legs) == 1 else _joined(legs, task)
     altitude = case.altitude_msl_m if runway is None else runway.height_m - (runway.geoid_separation_m or 0.0)
-    return Flight(case, route, level_m, areas, threats, home, takes_off, final, altitude)
+    flight = Flight(case, route, level_m, areas, threats, home, takes_off, final, altitude)
+    _check_areas(flight)
+    return flight
+
+
+def heights(flight: Flight) -> Floats:
+    """Heights above home (n,) at the points of the route: up to the level, along it, and down to where a final begins."""
+    station = stations(flight.route.curve_m)
+    level = np.minimum(flight.level_m, min(TAKE_OFF_M, flight.level_m) + GRADIENT * station)
+    if flight.final is None:
+        return np.asarray(level)
+    return np.asarray(np.minimum(level, flight.final.height_m + GRADIENT * (station[-1] - station)))
+
+
+def _check_areas(flight: Flight) -> None:
+    """Climb, descent and the straight ways from and to the ground have not been planned around areas. Raises PlanError."""
+    curve, height = flight.route.curve_m, heights(flight)
+    ways = [(curve, height), (resampled(np.stack([flight.takes_off_m, curve[0]])), height[:1])]
+    if (final := flight.final) is not None:
+        ways.append((resampled(np.stack([curve[-1], final.meets_m])), np.array([final.height_m])))
+        down = resampled(np.stack([final.meets_m, final.aims_m]))
+        ways.append((down, np.linspace(final.height_m, 0.0, len(down))))
+    for area in flight.case.areas:
+        for way, level in ways:
+            if ((area.distance(way)[0] < 0.0) & (level > area.base_m) & (level < area.top_m)).any():
+                named = f" {area.name!r}" if area.name else ""
+                raise PlanError(
+                    f"The climb, the descent or the final crosses the area{named}; it cannot be flown around."
+                )
 
 
 @dataclass(frozen=True, slots=True)
 class _Centreline:
-    """A runway on the plane: its centre and landing direction (2,), and the runway itself."""
+    """A runway as it lies on the plane of a case."""
 
-    centre_m: Floats
-    along: Floats
     runway: Runway
-
-    @classmethod
-    def of(cls, runway: Runway, plane: Plane) -> _Centreline:
-        centre = plane.place_m(np.degrees([runway.latitude_rad, runway.longitude_rad]))
-        along = np.array([math.sin(runway.landing_compass_rad), math.cos(runway.landing_compass_rad)])
-        return cls(centre, along, runway)
+    plane: Plane
 
     def at(self, x_m: float) -> Floats:
         """The point (2,) of the centreline at this x of the runway frame."""
-        return np.asarray(self.centre_m + x_m * self.along)
+        runway = self.runway
+        along = np.array([math.sin(runway.landing_compass_rad), math.cos(runway.landing_compass_rad)])
+        own = Plane(math.degrees(runway.latitude_rad), math.degrees(runway.longitude_rad))
+        return self.plane.place_m(own.place_deg(x_m * along))
 
 
 def _departure(case: Case, centreline: _Centreline | None) -> tuple[Floats, Floats, Floats, Floats | None]:
@@ -153,7 +189,7 @@ def _departure(case: Case, centreline: _Centreline | None) -> tuple[Floats, Floa
         raise PlanError("A route from the runway needs the site file that says where it is: --site FILE.")
     threshold = centreline.runway.threshold_x_m
     takes_off, start = centreline.at(-threshold), centreline.at(-threshold + DEPARTURE_M)
-    return centreline.at(threshold), takes_off, start, centreline.along
+    return centreline.at(threshold), takes_off, start, _unit(start - takes_off)
 
 
 def _arrival(case: Case, centreline: _Centreline | None, level_m: float) -> tuple[Floats, Floats | None, Final | None]:
@@ -166,7 +202,8 @@ def _arrival(case: Case, centreline: _Centreline | None, level_m: float) -> tupl
     height = min(level_m, FINAL_M)
     meets = runway.aiming_point_x_m - height / math.tan(runway.glide_path_rad)
     final = Final(centreline.at(meets), height, centreline.at(runway.aiming_point_x_m))
-    return centreline.at(meets - LEVEL_FINAL_M), centreline.along, final
+    goal = centreline.at(meets - LEVEL_FINAL_M)
+    return goal, _unit(final.meets_m - goal), final
 
 
 def _unit(vector: Floats) -> Floats:

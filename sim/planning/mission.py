@@ -19,15 +19,12 @@ from adapters.mission_writing import (
     Fence,
     MissionItem,
 )
-from sim.planning.field import stations
-from sim.planning.flight import Flight
+from sim.planning.flight import Flight, heights
 
 Floats = NDArray[np.float64]
 
 TOLERANCE_M = 15.0  # that the polyline is off the curve at most
 HEIGHT_TOLERANCE_M = 5.0
-TAKE_OFF_M = 50.0  # above home, where a take-off ends and the climb along the route begins
-GRADIENT = 0.05  # of climbs and descents: 2.9 degrees
 _GROUND_SPEED = 1.0  # DO_CHANGE_SPEED's kind 0 is airspeed, 1 ground speed
 _LONGEST = 400  # points of the curve that one straight may replace
 
@@ -37,7 +34,7 @@ def waypoints(flight: Flight, tolerance_m: float = TOLERANCE_M) -> Floats:
 
     From each the furthest is taken to which the straight keeps within the tolerance of all of the curve between.
     """
-    curve = np.column_stack([flight.route.curve_m, _heights(flight)])
+    curve = np.column_stack([flight.route.curve_m, heights(flight)])
     scaled = curve * [1.0, 1.0, tolerance_m / HEIGHT_TOLERANCE_M]
     chosen = [0]
     while chosen[-1] < len(curve) - 1:
@@ -60,16 +57,6 @@ def _off(points: Floats) -> float:
         return 0.0
     share = np.clip(aside @ along / length**2, 0.0, 1.0)
     return float(np.linalg.norm(aside - share[:, None] * along, axis=1).max())
-
-
-def _heights(flight: Flight) -> Floats:
-    """Heights above home (n,) at the points of the curve: up to the level, along it, and down to where a final begins."""
-    station = stations(flight.route.curve_m)
-    begins = min(TAKE_OFF_M, flight.level_m)
-    level = np.minimum(flight.level_m, begins + GRADIENT * station)
-    if flight.final is None:
-        return level
-    return np.asarray(np.minimum(level, flight.final.height_m + GRADIENT * (station[-1] - station)))
 
 
 def mission(flight: Flight, speed_mps: float | None = None) -> tuple[list[MissionItem], tuple[float, float, float]]:
