@@ -15,10 +15,19 @@ import json
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from adapters.mission_writing import MissionItem
+from adapters.mission_writing import (
+    ABOVE_HOME,
+    ABOVE_SEA,
+    LAND,
+    LANDING_SEQUENCE,
+    LOITER_TO_ALTITUDE,
+    WAYPOINT,
+    MissionItem,
+)
 from adapters.plans import plan_point
 from gateway.observation import PlanPoint
 
@@ -29,8 +38,8 @@ _PLAN = re.compile(rb'"fileType"\s*:\s*"Plan"')
 _VERSION = "110"
 _COLUMNS = 12
 _PX4 = 12  # numbers its items from 0, the others from 1: there 0 is home
-_GLOBAL, _ABOVE_HOME = 0, 3
-_WAYPOINT, _LOITER_TO_ALTITUDE, _LAND = 16, 31, 21
+_NOWHERE = (math.nan, math.nan, math.nan)
+_UNTOLD = (math.nan, math.nan, math.nan, math.nan)
 _LARGEST_BYTES = 16 << 20
 
 
@@ -41,10 +50,14 @@ class MissionFileError(ValueError):
 class _Item(NamedTuple):
     where: str  # for a person
     sequence: int
-    command: int
-    frame: int
-    place: tuple[float, float, float]
-    parameters: tuple[float, float, float] = (math.nan, math.nan, math.nan)  # the first three
+    item: MissionItem  # NaN where the file says nothing
+
+    @property
+    def point(self) -> PlanPoint | None:
+        """As a point of a plan; None where it is no place to pass."""
+        one = self.item
+        place = (one.latitude_deg, one.longitude_deg, one.altitude_m)
+        return plan_point(self.sequence, one.command, one.frame, *place, one.parameters[:3])
 
 
 def mission_kind(beginning: bytes) -> MissionKind | None:
@@ -60,14 +73,14 @@ def read_mission(path: Path) -> tuple[PlanPoint, ...]:
     Raises MissionFileError, with the line or item, for what is wrong in it or when there is no point.
     """
     items, home = _read(path)
-    points = [point for item in items if (point := plan_point(*item[1:4], *item.place, item.parameters)) is not None]
+    points = [point for one in items if (point := one.point) is not None]
     if not points:
         raise MissionFileError(f"{path} holds no item that is a place to fly to.")
     return (*home, *points)
 
 
 def read_items(path: Path) -> tuple[tuple[MissionItem, ...], PlanPoint | None]:
-    """All items of a mission file as a vehicle takes them, without home; and home, where it has one.
+    """All items of a mission file as a vehicle takes them (no place is 0), without home; and home, where it has one.
 
     Raises MissionFileError, with the line or item, for what is wrong in it or when there is no item.
     """
@@ -75,10 +88,10 @@ def read_items(path: Path) -> tuple[tuple[MissionItem, ...], PlanPoint | None]:
     if not items:
         raise MissionFileError(f"{path} holds no item.")
     read = []
-    for item in items:
-        latitude, longitude, altitude = (0.0 if math.isnan(part) else part for part in item.place)
-        parameters = (*item.parameters, math.nan)
-        read.append(MissionItem(item.command, latitude, longitude, altitude, item.frame, parameters))
+    for _, _, item in items:
+        place = (item.latitude_deg, item.longitude_deg, item.altitude_m)
+        latitude, longitude, altitude = (0.0 if math.isnan(part) else part for part in place)
+        read.append(replace(item, latitude_deg=latitude, longitude_deg=longitude, altitude_m=altitude))
     return tuple(read), next(iter(home), None)
 
 
@@ -98,7 +111,7 @@ def _read(path: Path) -> tuple[list[_Item], tuple[PlanPoint, ...]]:
 
 
 def _home(place: tuple[float, float, float]) -> tuple[PlanPoint, ...]:
-    found = plan_point(0, _WAYPOINT, _GLOBAL, *place)
+    found = plan_point(0, WAYPOINT, ABOVE_SEA, *place)
     if found is None:
         return ()
     return (PlanPoint(0, "home", found.latitude_rad, found.longitude_rad, altitude_msl_m=found.altitude_msl_m),)
@@ -123,8 +136,8 @@ def _of_lines(path: Path, text: str) -> tuple[list[_Item], tuple[PlanPoint, ...]
         if sequence == 0:
             home = _home(place)
         else:
-            given = (_number(words[4], where), _number(words[5], where), _number(words[6], where))
-            items.append(_Item(where, sequence, command, frame, place, given))
+            first, second, third, fourth = (_number(word, where) for word in words[4:8])
+            items.append(_Item(where, sequence, MissionItem(command, *place, frame, (first, second, third, fourth))))
     return items, home
 
 
@@ -155,8 +168,9 @@ def _plan_items(item: Any, sequence: int, where: str) -> Iterator[_Item]:
         if len(params) != 7:
             raise MissionFileError(f"{where}: params has {len(params)} values, a SimpleItem has 7.")
         command, frame = (_whole(item.get(name), f"{where}, {name}") for name in ("command", "frame"))
-        given = (_number(params[0], where), _number(params[1], where), _number(params[2], where))
-        yield _Item(where, sequence, command, frame, _place(params[4:], f"{where}, params"), given)
+        first, second, third, fourth = (_number(one, where) for one in params[:4])
+        place = _place(params[4:], f"{where}, params")
+        yield _Item(where, sequence, MissionItem(command, *place, frame, (first, second, third, fourth)))
     elif kind == "ComplexItem":
         yield from _complex_items(item, sequence, where)
     else:
@@ -170,13 +184,15 @@ def _complex_items(item: dict[str, Any], sequence: int, where: str) -> Iterator[
             yield from _plan_items(simple, sequence + count, f"{where}.{count + 1}")
     elif "landCoordinate" in item:
         above_home = item.get("altitudesAreRelative", True)
-        frame = _ABOVE_HOME if above_home else _GLOBAL
+        frame = ABOVE_HOME if above_home else ABOVE_SEA
         approach = item.get("landingApproachCoordinate", item.get("loiterCoordinate"))
-        yield _Item(where, sequence, 189, frame, (math.nan, math.nan, math.nan))  # DO_LAND_START
+        yield _Item(where, sequence, MissionItem(LANDING_SEQUENCE, *_NOWHERE, frame, _UNTOLD))
         place = _place(approach, f"{where}, landingApproachCoordinate")
-        command = _LOITER_TO_ALTITUDE if item.get("useLoiterToAlt", True) else _WAYPOINT
-        yield _Item(where, sequence + 1, command, frame, place, (math.nan, _radius(item, where), math.nan))
-        yield _Item(where, sequence + 2, _LAND, frame, _place(item["landCoordinate"], f"{where}, landCoordinate"))
+        command = LOITER_TO_ALTITUDE if item.get("useLoiterToAlt", True) else WAYPOINT
+        circle = (math.nan, _radius(item, where), math.nan, math.nan)
+        yield _Item(where, sequence + 1, MissionItem(command, *place, frame, circle))
+        ground = _place(item["landCoordinate"], f"{where}, landCoordinate")
+        yield _Item(where, sequence + 2, MissionItem(LAND, *ground, frame, _UNTOLD))
     else:
         kind = item.get("complexItemType")
         raise MissionFileError(f"{where}: a ComplexItem of type {kind!r} is not known; only surveys and landings are.")
