@@ -79,10 +79,8 @@ class Answerer:
                 self.vehicle.settings[change[0]] = change[1]
             return [Said("PARAM_VALUE", one) for one in values]
         if message == LONG:
-            *numbers, command, _, _ = _read_long(payload)
-            return self._command(
-                command, _Command((numbers[0], numbers[1], numbers[2], numbers[3]), *numbers[4:], ABOVE_HOME), station
-            )
+            p1, p2, p3, p4, latitude, longitude, z, number, _, _ = _read_long(payload)
+            return self._command(number, _Command((p1, p2, p3, p4), latitude, longitude, z, ABOVE_HOME), station)
         if message == INT:
             p1, p2, p3, p4, x, y, z, command, _, _, above = _read_int(payload)
             return self._command(command, _Command((p1, p2, p3, p4), x / 1e7, y / 1e7, z, above), station)

@@ -9,6 +9,7 @@ vehicles on, and a single one would be ten times slower (docs/simulated-vehicles
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, Protocol
 
@@ -123,16 +124,45 @@ class Home:
 class Vehicle(Protocol):
     """A vehicle that moves by itself, step by step. The same seed, orders and steps give the same bits."""
 
-    kind: int  # MAV_TYPE
-    modes: dict[str, int]  # ArduPilot's number of each mode that it has
-    step_s: float  # how far `step` goes
-    home: Home
-    mission: Mission
-    mode: str
-    is_armed: bool
-    moment: Moment
-    settings: dict[str, float]  # its parameters by ArduPilot's names; stations may set them
-    notes: list[str]  # short sentences for people as they come up; it only grows
+    @property
+    def kind(self) -> int:
+        """MAV_TYPE."""
+
+    @property
+    def modes(self) -> Mapping[str, int]:
+        """ArduPilot's number of each mode that it has."""
+
+    @property
+    def step_s(self) -> float:
+        """How far `step` goes."""
+
+    @property
+    def home(self) -> Home:
+        """Where it was switched on."""
+
+    @property
+    def mission(self) -> Mission:
+        """What it is to do."""
+
+    @property
+    def mode(self) -> str:
+        """The mode it is in, one of `modes`."""
+
+    @property
+    def is_armed(self) -> bool:
+        """Whether its motors may run."""
+
+    @property
+    def moment(self) -> Moment:
+        """The truth now."""
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """Its parameters by ArduPilot's names; stations may set them."""
+
+    @property
+    def notes(self) -> list[str]:
+        """Short sentences for people, as they come up; it only grows."""
 
     @property
     def is_landed(self) -> bool:

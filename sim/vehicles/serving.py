@@ -1,0 +1,111 @@
+"""Vehicles that stations talk to: flown at the pace of real time or so many times as fast, on links that send and receive.
+
+On a link that listens everybody who was heard is sent everything, as a router would. Behind real time for more than a
+second (too many vehicles, too high a speed), the vehicles' time runs slower than asked, and that is said once.
+"""
+
+from __future__ import annotations
+
+import select
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from adapters.mavlink_frames import FrameScanner, parse
+from gateway.runtime.links import Link
+from sim.vehicles.flying import STEP_S
+from sim.vehicles.motion import Vehicle
+from sim.vehicles.speaking import Speaker
+
+_LONGEST_WAIT_S = 0.02
+_BEHIND_S = 1.0
+_QUIET_PEER_NS = 30_000_000_000
+
+
+@dataclass(slots=True)
+class LinkedVehicles:
+    """All vehicles on one link. `speakers` are theirs on this link."""
+
+    link: Link
+    speakers: Sequence[Speaker]
+    sent: int = 0
+    _scanners: dict[str, FrameScanner] = field(default_factory=dict)
+    _heard_at: dict[str, int] = field(default_factory=dict)
+
+    def send(self, frames: list[bytes]) -> None:
+        """To whoever is there; a link that calls, or a byte stream, has its one peer."""
+        peers: list[str | None] = list(self._heard_at) if self.link.url.scheme == "udpin" else [None]
+        for frame in frames:
+            for peer in peers:
+                self.sent += self.link.send(frame, peer)
+
+    def listen(self, now: int) -> None:
+        """Take in what stations say, and answer."""
+        self.link.tend(now)
+        chunks = self.link.receive()
+        for peer, data in zip(chunks.peers, chunks.data, strict=True):
+            scanner = self._scanners.setdefault(peer, FrameScanner())
+            self._heard_at[peer] = now
+            found = scanner.feed_datagram(data) if chunks.stream is None else scanner.feed(data)
+            for raw in found:
+                frame = parse(raw)
+                if frame is not None and frame.verdict == "good":
+                    for speaker in self.speakers:
+                        self.send(speaker.hear(frame, now))
+        for peer in [one for one, at in self._heard_at.items() if now - at > _QUIET_PEER_NS]:
+            del self._heard_at[peer], self._scanners[peer]
+
+
+def serve(
+    vehicles: Sequence[Vehicle],
+    links: Sequence[LinkedVehicles],
+    *,
+    speed: float = 1.0,
+    asked_to_stop: Callable[[], object] = lambda: None,
+    tell: Callable[[str], None] = lambda text: None,
+) -> None:
+    """Fly the vehicles and talk on the links until asked to stop. `tell` is given what people should know, once."""
+    voices = [(one, _voices(one, links)) for one in vehicles]
+    began, flown_s, is_slow = time.monotonic(), 0.0, False
+    while not asked_to_stop():
+        turn = time.monotonic()
+        goal_s = (turn - began) * speed
+        while flown_s + STEP_S <= goal_s and time.monotonic() - turn < _LONGEST_WAIT_S:
+            flown_s += STEP_S
+            for vehicle, heard in voices:
+                _fly_to(vehicle, heard, flown_s)
+        if goal_s - flown_s > _BEHIND_S * speed:
+            began += (goal_s - flown_s) / speed
+            if not is_slow:
+                is_slow = True
+                tell(
+                    f"This machine is too slow for {len(vehicles)} vehicles at {speed:g} times real time: theirs is slower."
+                )
+        for linked in links:
+            linked.listen(time.monotonic_ns())
+            for level, text in linked.link.news:
+                tell(f"{level}: {text}")
+            linked.link.news.clear()
+        _wait(links, min((flown_s + STEP_S - goal_s) / speed, _LONGEST_WAIT_S))
+
+
+def _voices(vehicle: Vehicle, links: Sequence[LinkedVehicles]) -> list[tuple[LinkedVehicles, Speaker]]:
+    return [(linked, speaker) for linked in links for speaker in linked.speakers if speaker.vehicle is vehicle]
+
+
+def _fly_to(vehicle: Vehicle, voices: list[tuple[LinkedVehicles, Speaker]], time_s: float) -> None:
+    while vehicle.moment.time_s + vehicle.step_s <= time_s + 1e-6:
+        vehicle.step()
+        for linked, speaker in voices:
+            linked.send(speaker.say(time.monotonic_ns()))
+
+
+def _wait(links: Sequence[LinkedVehicles], seconds: float) -> None:
+    """Until somebody speaks, or it is time. A link that cannot be waited on is asked at every turn."""
+    if seconds <= 0.0:
+        return
+    open_ones = [number for linked in links if (number := linked.link.fileno()) is not None]
+    if open_ones:
+        select.select(open_ones, [], [], seconds)
+    else:
+        time.sleep(seconds)
