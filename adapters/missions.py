@@ -2,7 +2,7 @@
 
     HOME_POSITION (242)     latitude, longitude degE7, altitude mm above mean sea level: point 0 of the plan
     MISSION_CURRENT (42)    seq: the item it goes to; total; mission_state 1 no mission, 2 not begun, 5 complete;
-                            mission_mode 2 suspended: then it does not go there, and nothing is declared
+                            mission_mode 2 suspended: then it does not go there, and what was declared is withdrawn
 
 MISSION_CURRENT comes each second: an intent is told when it has changed. Item 0 of ArduPilot is home and no goal.
 """
@@ -49,14 +49,12 @@ def current_item(
     sequence, state, mode = _read_current(payload)
     vehicle.words["mission"] = "suspended" if mode == _SUSPENDED else _STATES.get(state, "not told")
     idle = state in _IDLE_STATES or mode == _SUSPENDED or (sequence == 0 and begins_with_home(vehicle))
-    if idle:
-        vehicle.plan.next_item = None
-        vehicle.plan.is_new_intent("mission", None)
-        vehicle.words["plan"] = vehicle.plan.summary()
-        return ()
-    vehicle.plan.next_item = sequence
+    vehicle.plan.next_item = None if idle else sequence
     vehicle.words["plan"] = vehicle.plan.summary()
     valid_at, _ = moments.at_receipt(component, received_at)
+    if idle:
+        withdrawn = vehicle.plan.is_withdrawn("mission")
+        return (Intent(vehicle.name, valid_at, received_at, "mission"),) if withdrawn else ()
     intent = mission_intent(vehicle, "mission", sequence, valid_at, received_at)
     return () if intent is None else (intent,)
 

@@ -116,7 +116,7 @@ class PlanBook:
     _expected: int | None = None
     _before: dict[int, PlanPoint] | None = None  # what it had when a station began to send it another
     _told: tuple[PlanPoint, ...] = ()
-    _intents: dict[str, tuple[float | None, ...] | None] = field(default_factory=dict)
+    _intents: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
 
     def hear(self, told: Overheard, *, by_vehicle: bool, begins_with_home: bool = True) -> bool:
         """One message of a transfer; whether the plan has changed and is whole (as far as its length is known)."""
@@ -156,12 +156,16 @@ class PlanBook:
             return point.altitude_msl_m
         return self._home.altitude_msl_m + above
 
-    def is_new_intent(self, told_by: str, goal: tuple[float | None, ...] | None) -> bool:
-        """Take in where the vehicle says that it goes (None = nowhere); whether that differs from what it said last."""
+    def is_new_intent(self, told_by: str, goal: tuple[float | None, ...]) -> bool:
+        """Take in where the vehicle says that it goes; whether that differs from what it said last."""
         if self._intents.get(told_by) == goal:
             return False
         self._intents[told_by] = goal
-        return goal is not None
+        return True
+
+    def is_withdrawn(self, told_by: str) -> bool:
+        """Take in that the vehicle does not say any more where it goes; whether it had."""
+        return self._intents.pop(told_by, None) is not None
 
     def summary(self) -> str:
         """The plan in a few words, for people."""

@@ -97,8 +97,8 @@ def _report(
 def _intent(vehicle: Vehicle, payload: bytes, when: When, received_at: int, counters: Counter[str]) -> Intent | None:
     latitude, longitude, altitude, flags = _read_next(payload)
     if not flags & _NEXT_WAYPOINT:
-        vehicle.plan.is_new_intent("utm", None)
-        return None
+        withdrawn = vehicle.plan.is_withdrawn("utm")
+        return Intent(vehicle.name, when[0], received_at, "utm") if withdrawn else None
     if not is_place(latitude, longitude) or latitude == longitude == 0:
         counters["next waypoint out of range"] += 1
         return None

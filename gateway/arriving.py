@@ -17,6 +17,7 @@ from gateway.observation import (
     RadarPlot,
     RadarStatus,
     Timing,
+    VehicleStatus,
     WeatherArea,
 )
 from gateway.state import State
@@ -24,7 +25,8 @@ from gateway.state import State
 CONTRADICTION_M = 5.0  # between the site's and the streams' geoid: beyond this it is said
 AIRCRAFT_AT_MOST, RADARS_AT_MOST = 10_000, 64  # a bound on what strangers can make us remember
 STAGED = (GpsReport, RadarPlot, RadarStatus)
-FORETELLING = (FlightPlan, Intent, AirData, WeatherArea)  # where an aircraft is going, the wind and the weather
+# where an aircraft is going, by its mode too; the wind and the weather
+FORETELLING = (FlightPlan, Intent, AirData, WeatherArea, VehicleStatus)
 
 
 class Arriving(Believing):

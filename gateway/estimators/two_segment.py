@@ -13,6 +13,7 @@ Source: 000 2.3, figure 3. Deviation: the print has no formula of P; it is where
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -29,7 +30,7 @@ Bools = NDArray[np.bool_]
 Rule = Literal["literal", "default"]
 
 STRAIGHT_RPS = 1e-9  # slower turns are none
-ALIGNED_RAD = math.radians(0.5)  # a turn by less is a straight
+ALIGNED_RAD = math.radians(0.05)  # a turn by less is a straight
 ROLL_OUT_RAD = math.radians(45.0)  # who is no more than this beyond its point turns back to it
 MOST_LEAD = 2.0  # radii: no turn begins earlier before its point
 FASTER = 4.0  # than usual who begins a turn late turns where the corner asks for it
@@ -92,15 +93,17 @@ def ahead(
     air_speed: Floats | None = None,
     slower: Floats | None = None,
     lead_m: Floats | None = None,
+    over: Bools | None = None,
+    join: Floats | None = None,
 ) -> Ahead:
     """The paths of n aircraft along their routes (n, p, 2) at horizons (h,) or (n, h); past the last point straight on.
 
     `turning_rps` (n,) is how fast they turn where they do not turn yet; `wind` (n, 2) where the air moves to, m/s, 0 where it
     is not known, and `air_speed` (n,) the speed through it that is kept; `slower` (n, p) what that is multiplied by on the way
     from one point to the next. `lead_m` (n,) is how near to a point the turn to the next begins, if it need not begin earlier;
-    None = it begins where the usual turn needs. `braking` (n,) m/s2 of who comes to rest beyond the last point, 0 of others;
-    `circles` which points are flown round. Who cannot come to point at the route is carried on in its present turn, and does
-    not follow.
+    None = it begins where the usual turn needs, and `over` (n, p) who turns only at the point. `join` (n, 2) is a place on the
+    way to the first point, NaN = none. `braking` (n,) m/s2 of who comes to rest beyond the last point, 0 of others; `circles`
+    which points are flown round. Who cannot come to point at the route is carried on in its present turn, and does not follow.
     """
     n = len(now.position)
     calm = np.zeros((n, 2)) if wind is None or rule == "literal" else wind
@@ -110,7 +113,10 @@ def ahead(
         route = route[:, :1]
     following = _following(route)
     target, arrived = entered(path, following[:, 0], circles, 0, speed / turning_rps)
-    turn, rate, follows = _first_turn(now, speed, course, target, following, turning_rps, rule)
+    if lead_m is not None:
+        arrived = arrived | _passed(now, course, following, lead_m)
+    via = target if join is None else np.where(np.isnan(join), target, join)
+    turn, rate, follows = _first_turn(now, speed, course, via, following, turning_rps, rule)
     turn, follows = np.where(arrived, 0.0, turn), follows | arrived
     ground, cornering, slower_from = speed, turning_rps, np.full(n, math.inf)
     looked_at_s = path.horizons.max(axis=1)
@@ -118,6 +124,8 @@ def ahead(
     def speed_on(heading: Floats) -> Floats:
         return ground_speed(heading, air, calm)
 
+    if join is not None:
+        turn, rate = _by_way_of(path, join, target, turn, rate, turning_rps, speed_on)
     for leg in range(route.shape[1]):
         if leg:
             if (path.time_s > looked_at_s).all():  # what comes after the last horizon is nothing to anybody
@@ -131,6 +139,8 @@ def ahead(
         path.extend(ground, rate, turn / np.maximum(np.abs(rate), STRAIGHT_RPS), leg)
         ground = speed_on(path.course)
         straight_m, cornering = _straight(path, target, following[:, leg : leg + 2], ground, turning_rps, lead_m)
+        if over is not None and lead_m is not None:
+            straight_m = straight_m + np.where(over[:, leg], lead_m, 0.0)
         path.straight(ground, np.where(arrived, 0.0, straight_m) / ground, leg)
         if circles is not None:
             go_round(path, circles, leg, following, arrived, turning_rps, speed_on)
@@ -173,6 +183,14 @@ def _following(route: Floats) -> Floats:
     return np.stack([*points, points[-1]], axis=1)
 
 
+def _passed(now: Moving, course: Floats, following: Floats, lead_m: Floats) -> Bools:
+    """Who (n,) has just flown by the first point, and has another one to go to: nobody has said yet that it goes there."""
+    way = following[:, 0] - now.position
+    behind = way[:, 0] * np.cos(course) + way[:, 1] * np.sin(course) <= 0.0
+    near = (way * way).sum(axis=1) <= lead_m * lead_m
+    return np.asarray(behind & near & (following[:, 0] != following[:, -1]).any(axis=1))
+
+
 def _first_turn(
     now: Moving, speed: Floats, course: Floats, target: Floats, following: Floats, turning_rps: Floats, rule: Rule
 ) -> tuple[Floats, Floats, Bools]:
@@ -192,6 +210,32 @@ def _first_turn(
         return turn, rate, known & np.where(turns, ~np.isnan(go), np.abs(off) <= intent.ALIGNED_RAD)
     there_is_more = (following[:, 0] != following[:, -1]).any(axis=1)  # inside the circle: it is all but there
     return turn, rate, known & (~np.isnan(go) | there_is_more | (turn == 0.0) & (np.abs(off) <= ALIGNED_RAD))
+
+
+def _by_way_of(
+    path: Path,
+    join: Floats,
+    target: Floats,
+    turn: Floats,
+    rate: Floats,
+    turning_rps: Floats,
+    speed_on: Callable[[Floats], Floats],
+) -> tuple[Floats, Floats]:
+    """Who flies by a place (n, 2) first does so, from a first turn on; then the turn to the target (n, 2), and its rate."""
+    there = ~np.isnan(join[:, 0])
+    off = or_zero(_off(path.position, path.course, join))
+    direct = there & (turn == 0.0)  # inside the turn's circle
+    turn = np.where(direct, np.abs(off), turn)
+    rate = np.where(direct, np.where(off < 0.0, -turning_rps, turning_rps), rate)
+    path.extend(speed_on(path.course), rate, np.where(there, turn / np.maximum(np.abs(rate), STRAIGHT_RPS), 0.0), 0)
+    ground = speed_on(path.course)
+    way, line = join - path.position, target - join
+    distance = or_zero(way[:, 0] * np.cos(path.course) + way[:, 1] * np.sin(path.course))
+    bend = np.abs(or_zero(wrap_rad(np.arctan2(line[:, 1], line[:, 0]) - path.course)))
+    straight_m = np.maximum(distance - ground / turning_rps * np.tan(0.5 * np.minimum(bend, 0.5 * math.pi)), 0.0)
+    path.straight(ground, np.where(there, straight_m / ground, 0.0), 0)
+    onto, rate_onto = _next_turn(path, target, ground, turning_rps)
+    return np.where(there, onto, turn), np.where(there, rate_onto, rate)
 
 
 def _next_turn(path: Path, point: Floats, ground: Floats, turning_rps: Floats) -> tuple[Floats, Floats]:

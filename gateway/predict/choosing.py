@@ -13,6 +13,7 @@ from gateway.estimators.intent import BELIEVED, USED_IN_TURN_RAD, Belief, Seen, 
 from gateway.estimators.turns_and_straights import or_zero
 from gateway.geodesy import wrap_rad
 from gateway.predict.goals import GO_AROUND, RUNWAY
+from gateway.predict.joining import joining
 from gateway.predict.minds import Minds
 from gateway.predict.stacked import Stacked
 from gateway.predict.table import DECLARED, INFERRED, NONE
@@ -34,8 +35,10 @@ class Chosen:
     """Which way n aircraft are expected to go."""
 
     route: Floats  # (n, 4, 2), NaN = the model's
+    join: Floats  # (n, 2) where it comes back to the line to the first point, NaN = nowhere
     up: Floats  # (n, 4)
     lands: Bools  # (n, 4)
+    over: Bools  # (n, 4)
     circles: Bools  # (n,) about a point, at a rate (n,)
     rate: Floats
     rounds: Circles
@@ -53,6 +56,7 @@ class _Declared:
     place: Ints
     since: Ints
     goal: Floats  # (n, 2), NaN = none
+    begins: Floats  # (n, 2) of the line to it, NaN = there is none
     circles: Bools
     rounds: Bools  # at a radius that nobody says
     radius: Floats  # NaN = it is not flown round, or at a radius that nobody says
@@ -65,6 +69,7 @@ class _Declared:
             goals.declared,
             goals.declared_at,
             np.where((goals.declared >= 0)[:, None], goals.route[rows, said, 0], math.nan),
+            goals.begins,
             goals.circles[rows, said],
             goals.rounds[rows, said],
             goals.radius[rows, said, 0],
@@ -78,6 +83,7 @@ class _Flown:
     route: Floats  # (n, 4, 2)
     up: Floats  # (n, 4)
     lands: Bools  # (n, 4)
+    over: Bools  # (n, 4)
     ends_round: Bools  # (n,)
     radius: Floats  # (n, 4)
     least: Floats  # (n, 4)
@@ -86,7 +92,15 @@ class _Flown:
     def of(cls, goals: Stacked, slots: Ints) -> _Flown:
         """To these candidates (n,)."""
         at = np.arange(len(slots)), slots
-        return cls(goals.route[at], goals.up[at], goals.lands[at], goals.rounds[at], goals.radius[at], goals.least[at])
+        return cls(
+            goals.route[at],
+            goals.up[at],
+            goals.lands[at],
+            goals.over[at],
+            goals.rounds[at],
+            goals.radius[at],
+            goals.least[at],
+        )
 
 
 def chosen(
@@ -95,7 +109,8 @@ def chosen(
     """What is believed of n aircraft that climb so fast (n,), and what is thought of them from now on."""
     declared = _Declared.of(goals)
     seen, belief, off = _inferred(before, at, now, goals, climb, site)
-    trust = trusted(before, at, now, declared.goal, declared.circles, declared.since)
+    join = joining(now, declared.begins, declared.goal)
+    trust = trusted(before, at, now, declared.goal, join, declared.circles, declared.since)
     trusts = or_zero(trust) >= TRUSTED
     left = to_turn(np.take_along_axis(or_zero(off), np.maximum(belief.best, 0)[:, None], axis=1), now.side)[:, 0]
     infers = (
@@ -124,8 +139,10 @@ def chosen(
     least[:, 0] = np.maximum(least[:, 0] - np.where(best == declared.place, circled, 0.0), 0.0)
     way = Chosen(
         np.where((used & ~circling)[:, None, None], flown.route, math.nan),
+        np.where((trusts & ~declared.circles)[:, None], join, math.nan),
         np.where(used[:, None], flown.up, math.nan),
         flown.lands & used[:, None],
+        flown.over,
         circling,
         rate,
         Circles(np.where(used[:, None], flown.radius, math.nan), least),

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from gateway.align import SECOND
 from gateway.estimators import two_segment
 from gateway.estimators.mode_set import level_turn_rate
+from gateway.estimators.turns_and_straights import or_zero
 from gateway.frames import RunwayFrame
 from gateway.fuse import Lane
 from gateway.fuse.weighting import Model
+from gateway.geodesy import wrap_rad
 from gateway.predict import weather
 from gateway.predict.candidates import weighed
 from gateway.predict.choosing import Chosen, chosen
@@ -33,18 +35,23 @@ from gateway.predict.spread import (
     spread,
     wind_sigma,
 )
+from gateway.predict.stacked import Stacked
 from gateway.predict.states import State
-from gateway.predict.table import Forecast
-from gateway.predict.thinking import TURNS_RAD, Motions, motions
+from gateway.predict.table import INFERRED, Forecast
+from gateway.predict.thinking import NEW_GOAL_S, TURNS_RAD, Motions, motions
 from gateway.predict.ways import ways_of
 from gateway.settings import Site
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 WIND_WITHIN = 60 * SECOND  # a wind told this lately is still so
 APPROACH = 0.8  # of its speed through the air an aircraft keeps on the way to a landing
 LEAD_S = 2.0  # autopilots fly on until they are so near to a point
+# who was told its next point lately, which lies aside, begins to turn; nobody turns tighter than for such a corner
+BEGINS_S, BEGINS_RAD, BEGUN_RAD, CORNER_RAD = 4.0, 0.2, 0.6, 2.3
+SLOWS_S = 4.0  # before a corner, if it does
 SETTLES = 10 * SECOND  # after a radar's track began: before, it may be an aircraft's, and its velocity is worth little
 LANDED_MPS2, ROUND_MPS2 = 2.0, 20.0  # braking beyond a landing, and at the middle of a circle that is to be flown
 
@@ -72,17 +79,19 @@ def forecast(
     usual = level_turn_rate(state.speed, site.estimation.bank_rad, site.estimation.turn_rate_rps)
     winds = _winds(predicting, lanes, at)
     through_air = np.sqrt(((state.velocity - winds) ** 2).sum(axis=1))
+    adapts = _adapts(before, stacked, at, state)
     now, minds = motions(
-        before, at, state.position, state.velocity, state.velocity_sigma, state.sides, usual, through_air
+        before, at, state.position, state.velocity, state.velocity_sigma, state.sides, usual, through_air, adapts
     )
     way, minds = chosen(before, minds, at, now, stacked, state.climb, site)
     horizons = state.since_s[:, None] + np.array(horizons_s)
     around = beside(horizons)
-    whole = _paths(now, way, state, winds, around)
+    whole = _paths(now, minds, at, way, state, winds, around)
     ahead, by_points = whole.first(horizons.shape[1]), whole.follows | way.circles
-    unscaled = spread(
-        now, whole, horizons, state.place_sigma, _rests(way, whole), way.confidence, wind_sigma(now, winds)
-    )
+    rests, inferred = _rests(way, whole), way.kind == INFERRED
+    heads_round = np.isfinite(way.rounds.radius[:, 0]) | np.isfinite(way.rounds.radius[:, 1])
+    wind = wind_sigma(now, winds)
+    unscaled = spread(now, whole, horizons, state.place_sigma, rests, way.confidence, inferred, heads_round, wind)
     sigma, minds = _in_hindsight(minds, at, horizons_s, state, now, ahead, unscaled)
     up = heights(state.up, state.climb, now, ahead, way.up, way.lands, way.route, horizons)
     mean = np.concatenate([ahead.position, up[..., None]], axis=2)
@@ -110,21 +119,47 @@ def forecast(
     return replace(predicting, remembered=predicting.remembered.after(tracks, minds), gates=gates), made
 
 
-def _paths(now: Motions, way: Chosen, state: State, winds: Floats, horizons: Floats) -> two_segment.Ahead:
+def _adapts(before: Minds, goals: Stacked, at: int, state: State) -> Bools:
+    """Who (n,) on a line of its plan is just before its end, or has lately begun it: there it may slow down."""
+    said = np.maximum(goals.declared, 0)
+    way = goals.route[np.arange(len(said)), said, 0] - state.position
+    near = (way * way).sum(axis=1) < (SLOWS_S * np.maximum(state.speed, 1.0)) ** 2
+    lately = at - before.declared_at < NEW_GOAL_S * SECOND
+    return np.asarray(~np.isnan(goals.begins[:, 0]) & (near | lately))
+
+
+def _paths(
+    now: Motions, minds: Minds, at: int, way: Chosen, state: State, winds: Floats, horizons: Floats
+) -> two_segment.Ahead:
     """The paths of n aircraft on their ways at horizons (n, h), in winds (n, 2)."""
-    start = two_segment.Moving(state.at_position, state.velocity, np.where(way.circles, way.rate, now.turn_rate))
+    said_s = (at - minds.declared_at) / SECOND
+    slows = way.lands[:, 0] & (said_s < NEW_GOAL_S)  # and has not done so yet
+    turn_rate = np.where(said_s < BEGINS_S, _cornering(now, way), now.turn_rate)
+    start = two_segment.Moving(state.at_position, state.velocity, np.where(way.circles, way.rate, turn_rate))
     return two_segment.ahead(
         start,
         way.route,
         horizons,
         now.turning,
         wind=winds,
-        air_speed=now.cruise,
+        air_speed=np.where(slows, APPROACH, 1.0) * now.cruise,
         slower=np.where(way.lands, APPROACH, 1.0),
         lead_m=LEAD_S * np.maximum(state.speed, 1.0),
         braking=np.where(way.lands.any(axis=1), LANDED_MPS2, np.where(way.ends_round, ROUND_MPS2, 0.0)),
+        over=way.over,
+        join=way.join if np.isfinite(way.join).any() else None,
         circles=way.rounds if np.isfinite(way.rounds.radius).any() else None,
     )
+
+
+def _cornering(now: Motions, way: Chosen) -> Floats:
+    """The turn rates (n,) of who begins a corner: as sharp as it asks of who has begun to turn so near to it."""
+    to_go = way.route[:, 0] - now.position
+    off = or_zero(wrap_rad(np.arctan2(to_go[:, 1], to_go[:, 0]) - now.course))
+    needed = np.tan(0.5 * np.minimum(np.abs(off), CORNER_RAD)) / LEAD_S
+    rate = np.maximum(np.abs(now.turn_rate), np.clip(needed, now.turning, two_segment.FASTER * now.turning))
+    starts = (np.abs(off) > BEGINS_RAD) & (now.side * off >= 0.0) & (now.unsettled < BEGUN_RAD)
+    return np.where(starts, np.sign(off) * rate, now.turn_rate)
 
 
 def _in_hindsight(

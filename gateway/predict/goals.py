@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from gateway.estimators.turns_and_straights import FULL_TURN
 from gateway.frames import RunwayFrame, turn
 from gateway.observation import FlightPlan, Intent, PlanPoint
-from gateway.predict.told import Told
+from gateway.predict.modes import circles_at_home, returning
+from gateway.predict.told import HOME_NAME, Told
 from gateway.settings import Site
 
 Floats = NDArray[np.float64]
@@ -47,6 +48,8 @@ class Goals:
     rounds: Bools  # (c,) such a point, of which the radius is not known, is the last of the route
     radius: Floats  # (c, 4) of what is flown round, positive to the left; NaN = none, or not known
     least: Floats  # (c, 4) radians that are flown round it at least
+    over: Bools  # (c, 4) points that are flown over, not by
+    begins: Floats  # (2,) where the line to what is declared begins, NaN = it is flown at from anywhere
     declared: int = -1  # which one it is said to go to
     declared_at: int = 0
     lowered: Floats = field(default_factory=lambda: np.ones(COUNT))  # (c,) of the weight, where weather is in the way
@@ -65,7 +68,7 @@ def goals_of(told: Told | None, site: Site, frame: RunwayFrame, separation_m: fl
     route, up = np.full((COUNT, LEGS, 2), math.nan), np.full((COUNT, LEGS), math.nan)
     names: list[str | None] = [None] * COUNT
     planned, circles = np.zeros(COUNT, dtype=np.bool_), np.zeros(COUNT, dtype=np.bool_)
-    lands = np.zeros((COUNT, LEGS), dtype=np.bool_)
+    lands, over = np.zeros((COUNT, LEGS), dtype=np.bool_), np.zeros((COUNT, LEGS), dtype=np.bool_)
     for slot, (name, enu) in zip((RUNWAY, GO_AROUND), _runway_goals(site, frame), strict=True):
         route[slot, 0], up[slot, 0], names[slot], lands[slot, 0] = enu[:2], enu[2], name, slot == RUNWAY
     for slot, waypoint in zip(PUBLISHED, site.waypoints, strict=False):
@@ -75,17 +78,22 @@ def goals_of(told: Told | None, site: Site, frame: RunwayFrame, separation_m: fl
         names[slot] = waypoint.name
     none = np.full((COUNT, LEGS), math.nan)
     if told is None:
-        return Goals(route, up, tuple(names), planned, lands, circles, circles, none, none)
+        return Goals(
+            route, up, tuple(names), planned, lands, circles, circles, none, none, lands & False, np.full(2, math.nan)
+        )
     declared, points, home_m = told.declared, _points(told.plan), _home_m(told.plan)
+    begins = np.full(2, math.nan)
     if declared is not None and declared.sequence is not None:
-        points = [point for point in points if point.sequence >= declared.sequence]
+        passed = [point for point in points if point.sequence < declared.sequence and point.kind != "take-off"]
+        points = points[len(points) - sum(point.sequence >= declared.sequence for point in points) :]
+        if passed and passed[-1].kind != "loiter":
+            begins = _place(passed[-1], home_m, separation_m, site, frame)[:2]
+    count, points = len(points), [*points, *_afterwards(told, points)]
     places = [_place(point, home_m, separation_m, site, frame) for point in points[: len(PLANNED) + LEGS]]
     rounds = np.zeros(COUNT, dtype=np.bool_)
     radius, least = np.full((COUNT, LEGS), math.nan), np.zeros((COUNT, LEGS))
-    for slot in PLANNED:
+    for slot in PLANNED[:count]:
         following = _until_a_circle(places[slot : slot + LEGS], points[slot : slot + LEGS])
-        if not following:
-            break
         last = points[slot + len(following) - 1]
         rounds[slot] = last.kind == "loiter" and last.radius_m is None
         for leg, point in enumerate(points[slot : slot + len(following)]):
@@ -94,12 +102,18 @@ def goals_of(told: Told | None, site: Site, frame: RunwayFrame, separation_m: fl
                 least[slot, leg] = math.inf if point.turns is None else point.turns * FULL_TURN
         route[slot, : len(following)] = [enu[:2] for enu in following]
         up[slot, : len(following)] = [enu[2] for enu in following]
+        over[slot, : len(following)] = [
+            place == count - 1 < len(places) - 1 for place in range(slot, slot + len(following))
+        ]
         lands[slot, : len(following)] = [point.kind == "landing" for point in points[slot : slot + len(following)]]
         names[slot], planned[slot] = f"{points[slot].kind} {points[slot].sequence}", True
         circles[slot] = points[slot].kind == "loiter"
     if told.plan is not None and told.plan.points and told.plan.points[0].kind == "home":
         enu = _place(told.plan.points[0], home_m, separation_m, site, frame)
-        route[HOME, 0], names[HOME] = enu[:2], "home"
+        route[HOME, 0], names[HOME] = enu[:2], HOME_NAME
+        if told.status is not None and returning(told.status):
+            circles[HOME] = rounds[HOME] = circles_at_home(told.status)
+            lands[HOME, 0] = not circles[HOME]
     chosen = _declared(declared, points, names)
     if chosen == DECLARED and declared is not None:
         place = _declared_place(declared, separation_m, site, frame)
@@ -108,7 +122,8 @@ def goals_of(told: Told | None, site: Site, frame: RunwayFrame, separation_m: fl
         else:
             (route[DECLARED, 0], up[DECLARED, 0]), names[DECLARED] = place, _called(declared)
     since = declared.valid_at if declared is not None else 0
-    return Goals(route, up, tuple(names), planned, lands, circles, rounds, radius, least, chosen, since)
+    begins = begins if chosen == PLANNED[0] else np.full(2, math.nan)
+    return Goals(route, up, tuple(names), planned, lands, circles, rounds, radius, least, over, begins, chosen, since)
 
 
 def _until_a_circle(places: list[Floats], points: Sequence[PlanPoint]) -> list[Floats]:
@@ -117,6 +132,17 @@ def _until_a_circle(places: list[Floats], points: Sequence[PlanPoint]) -> list[F
         if point.kind == "loiter" and point.radius_m is None:
             return places[:count]
     return places
+
+
+def _afterwards(told: Told, points: Sequence[PlanPoint]) -> list[PlanPoint]:
+    """Where it goes from a plan's last point: home, to circle there, as some do whose plan ends in the air."""
+    plan = told.plan
+    if plan is None or not points or not told.ends_at_home or plan.points[0].kind != "home":
+        return []
+    last = points[-1]
+    if last.kind == "landing" or (last.kind == "loiter" and last.turns is None):
+        return []
+    return [replace(plan.points[0], kind="loiter", altitude_msl_m=None)]
 
 
 def _points(plan: FlightPlan | None) -> list[PlanPoint]:

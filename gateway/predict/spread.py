@@ -11,12 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.estimators.turns_and_straights import or_zero
 from gateway.estimators.two_segment import Ahead
 from gateway.predict.thinking import Motions
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
+Bools = NDArray[np.bool_]
 
 ALONG_POINTS, ENDS_LANDED, ENDS_ROUND, ROUND_A_POINT, BY_MODEL = range(5)
 """What is known of a way: points to its end and maybe beyond it; to a landing; to a circle; on a circle; nothing."""
@@ -26,8 +27,10 @@ ALONG_POINTS, ENDS_LANDED, ENDS_ROUND, ROUND_A_POINT, BY_MODEL = range(5)
 # after a turn, and more while they are in one. What turns bring is a share of the time in which a turn goes through a radian.
 CRUISE, LATE_A_TURN, LATE_IN_TURN, LATE_SLOWER, LATE_LANDED_S = 0.005, 0.106, 0.08, 0.05, 2.0
 # along and across, shares of speed, past the end of the way: it has landed, it circles, nobody knows
+ROUND_S = 2.5  # half of the time in which it flies the radius of a circle that nobody says
 RESTS, ROUNDS, GOES_ANYWHERE = (0.2, 0.0), (0.25, 0.25), (1.2, 0.7)
 WANDERS_S, WANDERS_FOR_S, WANDERS_A_TURN = 0.116, 40.0, 0.0075
+ROUND_WANDERS_S = 0.3
 SWINGS, SWINGS_NOW, SWINGS_FOR_S = 0.12, 0.5, 4.0
 ACCELERATES_S = 1.7  # who changes its speed goes on doing so for this long
 # of the mean square of gusts: how far off the speed that is kept is, and for how many seconds what comes lasts, twice
@@ -36,8 +39,10 @@ ON_LINE_RAD = 0.3  # who has turned by more flies along a line between two point
 SETTLES_S = 10.0  # after a turn
 EARLY_S, EARLY = 2.0, 0.06  # how much earlier and later the way is looked at
 MANOEUVRES = 0.02  # rad2/s of course: how fast a course wanders that nobody has declared, turns and straights together
-DOUBTED = 0.9  # below this confidence the way may also be another one
-TOLD_WIND_MPS, UNKNOWN_WIND = 2.5, 0.1  # a told wind may be wrong by so much; an unknown one is this share of the speed
+DOUBTED = 0.9  # below this confidence a declared way may also be another one
+LEAST_DOUBT = 0.02  # of an inferred point
+# a told wind may be wrong by so much at first, and for good; an unknown one is this share of the speed
+TOLD_WIND_MPS, WIND_MPS, UNKNOWN_WIND = 2.5, 0.5, 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +66,8 @@ def wind_sigma(now: Motions, winds: Floats) -> Floats:
     What a vehicle says of it, it learns in turns.
     """
     told = (winds != 0.0).any(axis=1)
-    return np.asarray(np.where(told, TOLD_WIND_MPS / (1.0 + now.turned), UNKNOWN_WIND * now.speed))
+    learnt = np.sqrt((TOLD_WIND_MPS / (1.0 + now.turned)) ** 2 + WIND_MPS**2)
+    return np.asarray(np.where(told, learnt, UNKNOWN_WIND * now.speed))
 
 
 def spread(
@@ -71,9 +77,14 @@ def spread(
     place_sigma: Floats,
     kinds: Ints,
     confidence: Floats,
+    inferred: Bools,
+    heads_round: Bools,
     wind_mps: Floats,
 ) -> Spread:
     """Of n aircraft's predictions at horizons (n, h), of the kinds (n,) named above, believed with a confidence (n,).
+
+    Where the point is `inferred` (n,), that it flies there now is all that speaks for it; who `heads_round` (n,) a circle keeps
+    to no line.
 
     `whole` is the path at `beside`: who is early or late is somewhere else on it, which in a turn is also to one side.
     `wind_mps` (n,) is how far the wind may be from what it is taken for, m/s an axis.
@@ -89,14 +100,18 @@ def spread(
         np.where(lands, RESTS[axis], np.where(rounds, ROUNDS[axis], GOES_ANYWHERE[axis])) * over for axis in (0, 1)
     )
     late = (CRUISE * t) ** 2 + (LATE_A_TURN * turns_s) ** 2 + (LATE_IN_TURN * in_turn_s) ** 2
-    late = late + (LATE_SLOWER * whole.slower_s[:, :h]) ** 2 + np.where(lands & (over > 0.0), LATE_LANDED_S**2, 0.0)
+    soon = whole.over_s[:, 2 * h : 3 * h] > 0.0
+    late = late + (LATE_SLOWER * whole.slower_s[:, :h]) ** 2 + np.where(lands & soon, LATE_LANDED_S**2, 0.0)
     late = late + ends_along * ends_along
     wanders = WANDERS_S**2 * np.where(turned > ON_LINE_RAD, 1.0, 2.0 * (1.0 - np.exp(-t / WANDERS_FOR_S)))
     swings = (SWINGS * lately_s) ** 2 + (SWINGS_NOW * in_turn_s) ** 2 * np.exp(-t / SWINGS_FOR_S)
-    beside_s = wanders + swings + (WANDERS_A_TURN * turns_s) ** 2 + ends_across * ends_across
+    at_circle = ROUND_WANDERS_S**2 * heads_round[:, None]
+    beside_s = wanders + at_circle + swings + (WANDERS_A_TURN * turns_s) ** 2 + ends_across * ends_across
     doubt = np.maximum(DOUBTED - np.where(np.isnan(confidence), DOUBTED, confidence), 0.0)[:, None]
+    doubt = np.where(inferred[:, None], np.maximum(1.0 - or_zero(confidence), LEAST_DOUBT)[:, None], doubt)
     unknown = MANOEUVRES * speed * speed * np.where(by_model, 1.0, doubt) * t**3
     place = place_sigma[:, None] ** 2 + np.where(kind == ROUND_A_POINT, (0.25 * speed * t) ** 2, 0.0)
+    place = place + np.where(rounds & soon, (ROUND_S * speed) ** 2, 0.0)
     gains = (ACCELERATES_S * now.acceleration[:, None]) ** 2 + np.where(
         by_model, now.speed_sigma[:, None] ** 2, CRUISE_OFF * now.gusts[:, None]
     )

@@ -29,6 +29,8 @@ class Stacked:
     rounds: Bools  # (n, c)
     radius: Floats  # (n, c, 4)
     least: Floats  # (n, c, 4)
+    over: Bools  # (n, c, 4)
+    begins: Floats  # (n, 2)
     declared: Ints  # (n,) which is declared, -1 = none
     declared_at: Ints
     lowered: Floats  # (n, c)

@@ -31,7 +31,9 @@ WANDERS_LESS = 3.0  # a filter's velocity is wrong by no more than so often what
 SURE_AT_MOST = 0.25  # but by no less than this share of what the filter says
 TURNS_RAD = 0.25  # who has turned by more lately is in a turn, or just out of one
 CRUISE_S, CRUISE_IN_TURN_S, GUSTS_S = 10.0, 60.0, 40.0  # for how long a speed is remembered, and how it moves about
+STEADY = 0.05  # of its speed, a second: who slows down faster has not come to another speed yet
 ANOTHER_CRUISE = 0.12  # who flies straight and is faster or slower by such a share has taken up another speed
+NEW_GOAL_S = 8.0  # a new goal was declared: how long it takes to take up another speed
 UNSETTLED_S = 8.0  # how long a turn is felt
 
 REACTS_S = 6.0  # after a new goal was declared the aircraft has this long to begin to turn
@@ -70,11 +72,13 @@ def motions(
     sides: Floats,
     usual_rate: Floats,
     air_speed: Floats,
+    adapts: Bools,
 ) -> tuple[Motions, Minds]:
     """How n aircraft move now, and what is remembered of that.
 
     `sides` (n, 3) are the modes' probabilities of straight, left, right, NaN = no modes; `usual_rate` (n,) how fast one turns
-    at this speed. The turn rate is what the course has changed by, weighed against the usual one by how well it is known.
+    at this speed; who `adapts` (n,) may slow down for a while. The turn rate is what the course has changed by, weighed against
+    the usual one by how well it is known.
     """
     speed = np.sqrt(velocity[:, 0] * velocity[:, 0] + velocity[:, 1] * velocity[:, 1])
     course = np.arctan2(velocity[:, 1], velocity[:, 0])
@@ -86,7 +90,7 @@ def motions(
     measured = np.where(fresh, 0.0, wrap_rad(course - older) / np.where(fresh, 1.0, span_s))
     measured = np.where(speed < LEAST_SPEED_MPS, 0.0, measured)
     sigma = math.sqrt(2.0) * velocity_sigma / np.maximum(speed, LEAST_SPEED_MPS) / np.where(fresh, 1.0, span_s)
-    side, turn_rate = _turning(measured, sigma, sides, usual_rate)
+    side, turn_rate = _turning(measured, sigma, sides, usual_rate, before.unsettled < TURNS_RAD)
     gained = np.where(fresh, 0.0, np.maximum(np.abs(speed - before.speed) - SPEED_SIGMAS * velocity_sigma, 0.0))
     gained = gained / np.where(fresh, 1.0, elapsed_s)
     period_s = np.where(fresh, 1.0, elapsed_s)
@@ -97,7 +101,7 @@ def motions(
     turned = np.where(fresh | slow, 0.0, np.abs(wrap_rad(course - before.courses[:, 0])))
     turned = turned**3 / np.maximum(turned * turned + (2.0 * course_sigma) ** 2, 1e-12)  # as far as it is no noise
     unsettled = np.where(fresh, 0.0, before.unsettled * np.exp(-period_s / UNSETTLED_S)) + turned
-    cruise, gusts = _cruise(before, air_speed, unsettled, fresh, period_s)
+    cruise, gusts = _cruise(before, speed, air_speed, unsettled, fresh, adapts, period_s)
     all_turned = before.turned + turned
     minds = replace(
         before,
@@ -115,8 +119,11 @@ def motions(
     return Motions(*kinematics, unsettled, cruise, gusts, all_turned), minds
 
 
-def _turning(measured: Floats, sigma: Floats, sides: Floats, usual_rate: Floats) -> tuple[Ints, Floats]:
-    """The side (n,) that each surely turns to, and how fast, of turn rates that were measured so well."""
+def _turning(measured: Floats, sigma: Floats, sides: Floats, usual_rate: Floats, begins: Bools) -> tuple[Ints, Floats]:
+    """The side (n,) that each surely turns to, and how fast, of turn rates that were measured so well.
+
+    Of who only `begins` to turn a part of what was measured is still straight flight: it turns no slower than usual.
+    """
     by_modes = np.where(np.isnan(sides[:, 0]), 0, np.array([0, 1, -1])[or_zero(sides).argmax(axis=1)])
     by_modes = np.where(or_zero(sides).max(axis=1) > intent.TURN_SURE, by_modes, 0)
     by_course = np.where(np.abs(measured) > np.maximum(SURE_SIGMAS * sigma, LEAST_RATE_RPS), np.sign(measured), 0.0)
@@ -125,20 +132,29 @@ def _turning(measured: Floats, sigma: Floats, sides: Floats, usual_rate: Floats)
     known, assumed = 1.0 / np.maximum(sigma, 1e-4) ** 2, 1.0 / usual_sigma**2
     agrees = measured * side > 0.0
     rate = np.where(agrees, (measured * known + side * usual_rate * assumed) / (known + assumed), side * usual_rate)
+    rate = np.where(begins, side * np.maximum(np.abs(rate), usual_rate), rate)
     return side, np.where(side == 0, 0.0, rate)
 
 
 def _cruise(
-    before: Minds, air_speed: Floats, unsettled: Floats, fresh: Bools, period_s: Floats
+    before: Minds,
+    speed: Floats,
+    air_speed: Floats,
+    unsettled: Floats,
+    fresh: Bools,
+    adapts: Bools,
+    period_s: Floats,
 ) -> tuple[Floats, Floats]:
     """The speed (n,) through the air that is kept, and the mean square of what it is off that.
 
-    In a turn it is what it was before, since turns slow down or speed up.
+    In a turn it is what it was before, since turns slow down or speed up; who slows down has no other speed before it is there,
+    nor as long as it `adapts`.
     """
-    turns = unsettled > TURNS_RAD
     known = ~(fresh | np.isnan(before.cruise) | (before.speed < LEAST_SPEED_MPS))
     kept = np.where(known, before.cruise, air_speed)
-    other = ~turns & (np.abs(air_speed - kept) > ANOTHER_CRUISE * kept)
+    turns = (unsettled > TURNS_RAD) | (adapts & (air_speed < kept))
+    settled = (air_speed > kept) | (np.abs(speed - before.speed) < STEADY * speed * period_s)
+    other = ~turns & settled & (np.abs(air_speed - kept) > ANOTHER_CRUISE * kept)
     keep = np.where(other, 0.0, np.exp(-period_s / np.where(turns, CRUISE_IN_TURN_S, CRUISE_S)))
     slowly = np.where(known & ~turns & ~other, np.exp(-period_s / GUSTS_S), 1.0)
     gusts = slowly * before.gusts + (1.0 - slowly) * (air_speed - kept) ** 2
@@ -169,10 +185,11 @@ def inferred(
     return seen, intent.believed(weight, off, INFERENCE), off
 
 
-def trusted(before: Minds, at: int, now: Motions, goal: Floats, circles: Bools, since: Ints) -> Floats:
+def trusted(before: Minds, at: int, now: Motions, goal: Floats, join: Floats, circles: Bools, since: Ints) -> Floats:
     """How far it is to be believed (n,) that each aircraft goes to its declared goal (n, 2), said `since`; NaN = none.
 
-    A hidden Markov model of two states, following and not: who follows flies at the goal or turns towards it.
+    A hidden Markov model of two states, following and not: who follows flies at the goal, or turns towards it, or flies to
+    where it comes back to the line to it, `join` (n, 2), NaN = nowhere.
     """
     said = ~np.isnan(goal[:, 0])
     off = intent.off_course(now.position, now.velocity, goal[:, None])[:, 0]
@@ -185,7 +202,9 @@ def trusted(before: Minds, at: int, now: Motions, goal: Floats, circles: Bools, 
     elapsed_s = np.where(before.at == UNKNOWN, 1.0, np.clip((at - before.at) / SECOND, 0.0, STALE_S))
     toward = (now.side != 0) & (intent.to_turn(or_zero(off)[:, None], now.side)[:, 0] < math.pi)
     away = (now.side != 0) & ~toward
-    fits = np.exp(-0.5 * (or_zero(off) / TOLERATED_RAD) ** 2)
+    aside = intent.off_course(now.position, now.velocity, join[:, None])[:, 0]
+    least = np.fmin(np.abs(or_zero(off)), np.abs(aside))
+    fits = np.exp(-0.5 * (least / TOLERATED_RAD) ** 2)
     likelihood = np.where(toward, np.maximum(fits, 0.5), np.where(away, 0.05, np.maximum(fits, 0.02)))
     likelihood = np.where(
         circles & (distance < 2.0 * NEAR_RADII * radius), np.where(now.side != 0, 0.5, WANDERS), likelihood

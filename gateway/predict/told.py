@@ -6,16 +6,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from gateway.align import SECOND
-from gateway.observation import AirData, FlightPlan, Intent, WeatherArea
+from gateway.observation import AirData, FlightPlan, Intent, VehicleStatus, WeatherArea
+from gateway.predict.modes import ends_at_home, returning
 from gateway.settings import Site
 
 AIRCRAFT_AT_MOST = 10_000  # a bound on what strangers can make us remember
 AREAS_AT_MOST = 200
 TELLERS = ("declared", "utm", "mission", "high latency")  # whoever stands first is believed first
+BEFORE_MODES = TELLERS[:2]
+HOME_NAME = "home"
 FIXED_NAMES = ("runway", "go-around")  # of points that every site has
 FORGOTTEN_AFTER = 3600 * SECOND  # of aircraft that are not tracked
 
-Said = FlightPlan | Intent | AirData | WeatherArea
+Said = FlightPlan | Intent | AirData | WeatherArea | VehicleStatus
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,13 +30,23 @@ class Told:
         default_factory=dict
     )  # by teller; one without a goal withdraws the one before
     wind: AirData | None = None
+    status: VehicleStatus | None = None  # the first in which it was in the mode that it is in
     at: int = 0  # the newest of all
 
     @property
     def declared(self) -> Intent | None:
-        """The intent that counts, or None."""
+        """The intent that counts, or None. Who flies home by its mode does so whatever item its mission is at."""
         goals = (self.intents.get(teller) for teller in TELLERS)
-        return next((one for one in goals if one is not None and has_goal(one)), None)
+        best = next((one for one in goals if one is not None and has_goal(one)), None)
+        if self.status is None or not returning(self.status) or (best is not None and best.told_by in BEFORE_MODES):
+            return best
+        since = self.status.valid_at
+        return Intent(self.status.aircraft, since, self.status.received_at, "mission", name=HOME_NAME)
+
+    @property
+    def ends_at_home(self) -> bool:
+        """Whether it flies home when its plan is done."""
+        return self.status is not None and ends_at_home(self.status)
 
 
 def has_goal(intent: Intent) -> bool:
@@ -44,7 +57,7 @@ def has_goal(intent: Intent) -> bool:
 def known_points(told: Told | None, site: Site) -> tuple[str, ...]:
     """The names of the points that one aircraft can be declared to go to, the plan's items by their numbers."""
     points = told.plan.points if told is not None and told.plan is not None else ()
-    home = ("home",) if any(point.kind == "home" for point in points) else ()
+    home = (HOME_NAME,) if any(point.kind == "home" for point in points) else ()
     items = tuple(str(point.sequence) for point in points if point.kind != "home")
     return (*(waypoint.name for waypoint in site.waypoints), *FIXED_NAMES, *home, *items)
 
@@ -62,6 +75,8 @@ class Tellings:
             return self._hearing_weather(said)
         known = self.by_aircraft.get(said.aircraft)
         if known is None:
+            if isinstance(said, VehicleStatus):
+                return self  # of who says nothing of where it goes its mode says nothing either
             if len(self.by_aircraft) >= AIRCRAFT_AT_MOST:
                 return self
             known = Told()
@@ -86,7 +101,9 @@ class Tellings:
         return Tellings({name: told for name, told in self.by_aircraft.items() if name not in gone}, self.weather)
 
 
-def _after(known: Told, said: FlightPlan | Intent | AirData) -> Told:
+def _after(known: Told, said: FlightPlan | Intent | AirData | VehicleStatus) -> Told:
+    if isinstance(said, VehicleStatus):
+        return _in_mode(known, said)
     at = max(known.at, said.valid_at)
     if isinstance(said, FlightPlan):
         if known.plan is not None and said.valid_at < known.plan.valid_at:
@@ -101,4 +118,17 @@ def _after(known: Told, said: FlightPlan | Intent | AirData) -> Told:
         return known
     if known.wind is not None and said.valid_at < known.wind.valid_at:
         return known
-    return Told(known.plan, known.intents, said, at)  # `replace` takes three times as long, and winds come thick
+    # `replace` takes three times as long, and winds come thick
+    return Told(known.plan, known.intents, said, known.status, at)
+
+
+def _in_mode(known: Told, said: VehicleStatus) -> Told:
+    """The same with the mode that it says, where that is news."""
+    before = known.status
+    if before is not None and (
+        said.valid_at < before.valid_at
+        or (said.vehicle_type, said.autopilot, said.custom_mode)
+        == (before.vehicle_type, before.autopilot, before.custom_mode)
+    ):
+        return known
+    return replace(known, status=said, at=max(known.at, said.valid_at))

@@ -75,6 +75,7 @@ def test_who_does_not_fly_its_mission_goes_nowhere(plane: Any, values: dict[str,
     active = {"seq": 1, "mission_state": 3, "mission_mode": 1}
     assert plane.say("MISSION_CURRENT", **active | values) == ()
     assert plane.one("MISSION_CURRENT", **active).sequence == 1
+    assert plane.one("MISSION_CURRENT", **active | values).sequence is None, "withdrawn"
     assert plane.say("MISSION_CURRENT", **active | values) == ()
     assert plane.one("MISSION_CURRENT", **active).sequence == 1, "told again when it goes on"
 

@@ -42,6 +42,7 @@ def test_the_next_waypoint_is_an_intent_told_once(plane: Any) -> None:
     assert (intent.height_m, intent.altitude_msl_m, intent.sequence) == (465.0, None, None)
     assert len(_say(plane)) == 1
     assert _say(plane, next_lat=312_000_000)[1].latitude_rad == pytest.approx(math.radians(31.2))
+    assert _say(plane, flags=127)[1].latitude_rad is None, "withdrawn"
     assert len(_say(plane, flags=127)) == 1
     assert len(_say(plane, next_lat=312_000_000)) == 2, "told again after there was none"
 
