@@ -1,13 +1,13 @@
-"""The sessions of a folder: listed, and mended where one was killed."""
+"""The sessions of a folder, each completed where it was killed."""
 
 from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
+from gateway.runtime.archived import read_table
 from gateway.runtime.folder import SESSION_FILE, FolderError, Record, read_record, write_record
 from gateway.runtime.inputs import SessionInput
 from gateway.runtime.outputs import RRD_FILE
@@ -16,17 +16,6 @@ from gateway.sinks.parquet import finish, unfinished
 
 _DRAWN_WITHIN_S = 10.0  # of the kill: what was handed over to the process that draws is less than a second
 _UNTOLD_NS = 2_000_000_000  # rows are not further ahead of session.json; a stream at another speed has another clock
-
-
-@dataclass(frozen=True, slots=True)
-class Listed:
-    """One session as a list shows it. `mended` says what was done to it just now, "" for nothing."""
-
-    folder: Path
-    record: Record
-    size_bytes: int
-    running: bool
-    mended: str = ""
 
 
 def is_session(folder: Path) -> bool:
@@ -44,15 +33,6 @@ def session_folders(parent: Path) -> list[Path]:
     if not parent.is_dir():
         raise FolderError(f"There is no folder {parent}.")
     return sorted(path for path in parent.iterdir() if is_session(path))
-
-
-def sessions(parent: Path) -> Iterator[Listed]:
-    """Every session of a folder, mended first where it was killed. Raises FolderError; OSError when mending fails."""
-    for folder in session_folders(parent):
-        mended = mend(folder)
-        size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
-        record = read_record(folder)
-        yield Listed(folder, record, size, record.ended is None, mended)
 
 
 def mend(folder: Path) -> str:
@@ -90,7 +70,6 @@ def _watermark(folder: Path, record: Record) -> int:
     Rows without an observation (predictions, coasting) tell that the watermark had come to their instant.
     """
     import pyarrow.compute as pc  # 0.1 s that every start would wait for, and only what was killed needs
-    import pyarrow.parquet as pq
 
     until = record.watermark if record.watermark is not None else record.started_at
     for source in record.sources:
@@ -99,8 +78,8 @@ def _watermark(folder: Path, record: Record) -> int:
     offset_ns = (record.epoch_offset_s or 0) * 1_000_000_000
     if not (folder / "tracks.parquet").exists():
         return until  # it was killed before its place was known
-    made = pq.read_table(folder / "predictions.parquet", columns=["made"])["made"]
-    tracks = pq.read_table(folder / "tracks.parquet", columns=["time", "received"])
+    made = read_table(folder, "predictions", ["made"])["made"]
+    tracks = read_table(folder, "tracks", ["time", "received"])
     coasted = tracks.filter(pc.is_null(tracks["received"]))["time"]
     for times in (made, coasted):
         if len(times):

@@ -6,6 +6,7 @@ import math
 import types
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
+from functools import cache
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 
@@ -14,8 +15,14 @@ def misfit(value: Any) -> str | None:
 
     Numbers have to be finite, and whole ones fit into 64 bits.
     """
-    hints = get_type_hints(type(value))
+    hints = _hints(type(value))  # type: ignore[arg-type]  # mypy doubts that types can be hashed
     return next((one.name for one in fields(value) if not _fits(getattr(value, one.name), hints[one.name])), None)
+
+
+@cache
+def _hints(kind: type) -> Mapping[str, Any]:
+    """A dataclass's annotations; evaluating them takes longer than all else that is done to a session.json."""
+    return get_type_hints(kind)
 
 
 def _fits(value: Any, kind: Any) -> bool:
