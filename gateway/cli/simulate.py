@@ -13,6 +13,7 @@ import typer
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
 from gateway.cli.replay_options import read_speed
+from gateway.cli.vehicles import VehicleType, Wanted, simulate_vehicles
 
 if TYPE_CHECKING:
     from sim.scene import Scene
@@ -22,7 +23,8 @@ Play a simulated world onto the real wires: aircraft as MAVLink, radars as landi
 
 A scene is a TOML file: one that comes along ([bold]--list[/] names them) or one of your own (docs/scenes.md);
 [bold]--show[/] prints one to begin with. The scene [bold]radar[/] is a landing radar that watches the aircraft of a
-recording or of a live link.
+recording or of a live link. The scene [bold]vehicle[/] is a vehicle that ground stations talk to: it takes missions,
+modes and commands, and flies.
 
 Examples:
 
@@ -39,7 +41,12 @@ Examples:
   talkdown simulate mine.toml --seed 7
 
   talkdown simulate radar --watch flight.tlog --site field.toml --archive sessions
+
+  talkdown simulate vehicle --type copter --home 47.397,8.546,490 --mavlink udpout:127.0.0.1:14550
+
+  talkdown simulate vehicle --mission route.plan --wind 8,270,1.5 --archive flights
 """
+_VEHICLE = "For the scene vehicle"
 
 
 def register(app: typer.Typer) -> None:
@@ -89,6 +96,53 @@ def simulate(
         bool, typer.Option("--list", help="List the scenes that there are, or those in a folder.")
     ] = False,
     shown: Annotated[bool, typer.Option("--show", help="Print the scene's file, to be copied and changed.")] = False,
+    kind: Annotated[
+        VehicleType, typer.Option("--type", help="What it is.", rich_help_panel=_VEHICLE)
+    ] = VehicleType.plane,
+    mission: Annotated[
+        Path | None,
+        typer.Option(
+            "--mission",
+            metavar="FILE",
+            help="What it is to fly: .plan or QGC WPL 110.",
+            show_default=False,
+            rich_help_panel=_VEHICLE,
+        ),
+    ] = None,
+    home: Annotated[
+        str | None,
+        typer.Option(
+            "--home",
+            metavar="LAT,LON[,ALT[,HEADING]]",
+            help="Where it stands: degrees, m above the sea. (default: the mission's, or the runway)",
+            show_default=False,
+            rich_help_panel=_VEHICLE,
+        ),
+    ] = None,
+    count: Annotated[int, typer.Option("--count", metavar="N", help="So many.", rich_help_panel=_VEHICLE)] = 1,
+    wind: Annotated[
+        str | None,
+        typer.Option(
+            "--wind",
+            metavar="SPEED[,FROM[,GUSTS]]",
+            help="m/s, degrees, m/s.",
+            show_default=False,
+            rich_help_panel=_VEHICLE,
+        ),
+    ] = None,
+    start: Annotated[
+        bool, typer.Option("--start", help="Begin the mission without being told.", rich_help_panel=_VEHICLE)
+    ] = False,
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            "--seconds",
+            metavar="S",
+            help="End after so long, by the vehicle's clock.",
+            show_default=False,
+            rich_help_panel=_VEHICLE,
+        ),
+    ] = None,
     quiet: take.QuietOption = False,
 ) -> None:
     """Play a simulated world."""
@@ -103,6 +157,10 @@ def simulate(
         show_scene(scene)
         return
     pace = read_speed(speed, 1.0)
+    if scene == "vehicle":
+        wanted = Wanted(kind, mission, home, count, wind, start, seconds, seed or 0)
+        simulate_vehicles(wanted, site, mavlink, speed=pace, archive=archive, quiet=quiet)
+        return
     if (scene == "radar") != (watch is not None):
         raise UsageError("--watch belongs to the scene radar: talkdown simulate radar --watch FILE|URL.")
     if watch is not None:

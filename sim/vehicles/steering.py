@@ -8,7 +8,7 @@ wind into the circle.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from gateway.geodesy import meridian_radius_m, prime_vertical_radius_m
@@ -48,6 +48,12 @@ class Plane:
         """A geodetic place."""
         further = wrapped(longitude_rad - self.longitude_rad)
         return Spot((latitude_rad - self.latitude_rad) * self.north_m, further * self.east_m, height_m)
+
+    def beside(self, home: Home, right_m: float) -> Home:
+        """Another home, so far to the right of one that is on this plane."""
+        north, east = -right_m * math.sin(home.heading_rad), right_m * math.cos(home.heading_rad)
+        latitude, longitude = home.latitude_rad + north / self.north_m, home.longitude_rad + east / self.east_m
+        return replace(home, latitude_rad=latitude, longitude_rad=longitude)
 
     def of(self, body: Body) -> Spot:
         """Where a body is."""

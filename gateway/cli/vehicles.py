@@ -1,0 +1,255 @@
+"""`talkdown simulate vehicle`: vehicles that stations talk to, or their flight into an archived session."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gateway.cli import options as take
+from gateway.cli.failures import RunError, UsageError
+
+if TYPE_CHECKING:
+    from adapters.mission_writing import MissionItem
+    from gateway.runtime.links import Link
+    from gateway.runtime.setup import Place
+    from sim.vehicles.motion import Home, Vehicle
+    from sim.vehicles.speaking import Speaker
+    from sim.vehicles.wind import WindParameters
+
+_APART_M = 40.0  # several vehicles stand side by side
+_LONGEST_S = 7200.0
+_MOST_VEHICLES = 200
+
+
+class VehicleType(StrEnum):
+    """What flies, or sails."""
+
+    plane = "plane"
+    copter = "copter"
+    helicopter = "helicopter"
+    ship = "ship"
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What the command line says of vehicles."""
+
+    kind: VehicleType
+    mission: Path | None
+    home: str | None
+    count: int
+    wind: str | None
+    starts: bool
+    seconds: float | None
+    seed: int
+
+
+def simulate_vehicles(
+    wanted: Wanted, site: Path | None, mavlink: str, *, speed: float | None, archive: Path | None, quiet: bool
+) -> None:
+    """Fly them: on a link until Ctrl-C, or with `archive` into a session. Raises UsageError, RunError."""
+    import time
+
+    place = take.read_place(site)
+    items, home = _items_and_home(wanted, place)
+    start_ns = time.time_ns() // 4000 * 4000
+    if archive is not None and not items:
+        raise UsageError("--archive flies a mission to its end: give one with --mission FILE.")
+    fleet = _fleet(wanted, items, home)
+    if wanted.starts or archive is not None:
+        _start(fleet)
+    if archive is not None:
+        _write(_speakers(fleet, wanted, start_ns), archive, start_ns, place, wanted, quiet)
+        return
+    if speed is None:
+        raise UsageError(
+            "Stations cannot follow --speed max; write a number, or --archive DIR to fly without stations."
+        )
+    _serve(fleet, wanted, mavlink, start_ns, speed, quiet)
+
+
+def _items_and_home(wanted: Wanted, place: Place | None) -> tuple[tuple[MissionItem, ...], Home]:
+    from adapters.mission_files import MissionFileError, read_items
+    from sim.vehicles.motion import Home
+
+    items: tuple[MissionItem, ...] = ()
+    point = None
+    if wanted.mission is not None:
+        try:
+            items, point = read_items(wanted.mission)
+        except MissionFileError as error:
+            raise UsageError(str(error)) from error
+    separation = 0.0 if place is None else place.site.runway.geoid_separation_m or 0.0
+    ground_m = separation if place is None else place.site.runway.height_m
+    if wanted.home is not None:
+        latitude, longitude, altitude, heading = _numbers(
+            wanted.home, "--home", (None, None, ground_m - separation, 0.0)
+        )
+        if abs(latitude) > 90.0 or abs(longitude) > 180.0:
+            raise UsageError(f"--home {wanted.home!r} is no place: write latitude and longitude in degrees.")
+        where = (math.radians(latitude), math.radians(longitude))
+        heading_rad = math.radians(heading) if wanted.home.count(",") == 3 else _first_course(items, *where)
+        return items, Home(*where, altitude + separation, heading_rad, separation)
+    if point is not None:
+        where = (point.latitude_rad, point.longitude_rad)
+        height = ground_m if point.altitude_msl_m is None else point.altitude_msl_m + separation
+        return items, Home(*where, height, _first_course(items, *where), separation)
+    if place is None:
+        raise UsageError(
+            "Where does it stand? Write --home LAT,LON[,ALTITUDE[,HEADING]], or give --site or a mission with a home."
+        )
+    runway = place.site.runway
+    return items, Home(runway.latitude_rad, runway.longitude_rad, ground_m, runway.landing_compass_rad, separation)
+
+
+def _numbers(text: str, option: str, defaults: tuple[float | None, ...]) -> list[float]:
+    """Numbers with commas between; those that are missing at the end are the defaults. Raises UsageError."""
+    words = text.split(",")
+    try:
+        numbers = [float(word) for word in words]
+    except ValueError:
+        numbers = [math.nan]
+    numbers += [one for one in defaults[len(words) :] if one is not None]
+    if len(numbers) != len(defaults) or not all(map(math.isfinite, numbers)):
+        least = sum(one is None for one in defaults)
+        raise UsageError(f"{option} {text!r} is not {least} to {len(defaults)} numbers with commas between.")
+    return numbers
+
+
+def _first_course(items: tuple[MissionItem, ...], latitude_rad: float, longitude_rad: float) -> float:
+    """From home to the first place of a mission that is not home: where a take-off run goes; north where there is none."""
+    for item in items:
+        north = math.radians(item.latitude_deg) - latitude_rad
+        east = (math.radians(item.longitude_deg) - longitude_rad) * math.cos(latitude_rad)
+        if item.latitude_deg != 0.0 and math.hypot(north, east) > 1e-6:
+            return math.atan2(east, north)
+    return 0.0
+
+
+def _fleet(wanted: Wanted, items: tuple[MissionItem, ...], home: Home) -> dict[int, Vehicle]:
+    """The vehicles by their numbers, side by side to the right of the first."""
+    from sim.vehicles.steering import Plane
+
+    if not 1 <= wanted.count <= _MOST_VEHICLES:
+        raise UsageError(f"--count {wanted.count} is not from 1 to {_MOST_VEHICLES}.")
+    wind, plane = _wind(wanted.wind), Plane.about(home)
+    return {
+        number: _vehicle(wanted, items, plane.beside(home, _APART_M * (number - 1)), wind, number)
+        for number in range(1, wanted.count + 1)
+    }
+
+
+def _vehicle(wanted: Wanted, items: tuple[MissionItem, ...], home: Home, wind: WindParameters, number: int) -> Vehicle:
+    from sim.ships.fitting_out import vessel
+    from sim.vehicles.flying import HELICOPTER, QUADROTOR, aeroplane, rotorcraft
+
+    if wanted.kind is VehicleType.ship:
+        return vessel(home, items, seed=wanted.seed, system=number)
+    if wanted.kind is VehicleType.plane:
+        return aeroplane(home, items, wind=wind, seed=wanted.seed, system=number)
+    kind = QUADROTOR if wanted.kind is VehicleType.copter else HELICOPTER
+    return rotorcraft(home, items, kind=kind, wind=wind, seed=wanted.seed, system=number)
+
+
+def _wind(text: str | None) -> WindParameters:
+    from sim.vehicles.wind import WindParameters
+
+    if text is None:
+        return WindParameters()
+    speed, where_from, gusts = _numbers(text, "--wind", (None, 0.0, 0.0))
+    if not 0.0 <= speed <= 60.0 or not 0.0 <= gusts <= 15.0:
+        raise UsageError(f"--wind {text!r}: 0 to 60 m/s, from degrees, gusts of 0 to 15 m/s.")
+    return WindParameters(speed, math.radians(where_from), gusts)
+
+
+def _start(fleet: dict[int, Vehicle]) -> None:
+    from sim.vehicles.motion import Arm, SetMode
+
+    for vehicle in fleet.values():
+        for order in (Arm(True), SetMode("AUTO")):
+            answer = vehicle.order(order)
+            if answer.result != "accepted":
+                raise UsageError(f"It cannot start: {answer.why}; give a mission with --mission FILE.")
+
+
+def _speakers(fleet: dict[int, Vehicle], wanted: Wanted, start_ns: int) -> list[Speaker]:
+    from sim.vehicles.speaking import Speaker, sensors_of
+
+    return [Speaker.of(number, one, sensors_of(wanted.seed, number), start_ns) for number, one in fleet.items()]
+
+
+def _write(
+    speakers: list[Speaker], archive: Path, start_ns: int, place: Place | None, wanted: Wanted, quiet: bool
+) -> None:
+    from gateway.runtime.folder import FolderError
+    from sim.vehicles.recording import write_flight
+
+    longest = _LONGEST_S if wanted.seconds is None else wanted.seconds
+    try:
+        folder = write_flight(
+            speakers,
+            archive,
+            start_ns,
+            site=None if place is None else place.text,
+            longest_s=longest,
+            command=tuple(sys.argv[1:]),
+        )
+    except FolderError as error:
+        raise UsageError(str(error)) from error
+    except OSError as error:
+        raise RunError(f"{archive} could not be written: {(error.strerror or str(error)).lower()}.") from error
+    if not quiet:
+        for speaker in speakers:
+            print(f"mavlink:{speaker.encoder.system} {_came_to(speaker)}")
+        print(f"archived in {folder}")
+
+
+def _came_to(speaker: Speaker) -> str:
+    """How far its mission came, in a few words."""
+    from sim.vehicles.recording import is_at_rest
+
+    vehicle = speaker.vehicle
+    reached, total = len(set(vehicle.mission.reached)), sum(one.command <= 95 for one in vehicle.mission.items[1:])
+    state = "at rest" if is_at_rest(speaker) else "still under way"
+    return f"{state} after {vehicle.moment.time_s:.0f} s, {reached} of {total} places reached"
+
+
+def _serve(fleet: dict[int, Vehicle], wanted: Wanted, mavlink: str, start_ns: int, speed: float, quiet: bool) -> None:
+    from gateway.runtime.links import open_link
+    from gateway.runtime.signals import StopSignals
+    from gateway.runtime.urls import MAVLINK_PORT, LinkError
+    from sim.vehicles.serving import LinkedVehicles, serve
+
+    opened: list[Link] = []
+    try:
+        for url in take.read_urls(mavlink.split(","), MAVLINK_PORT):
+            opened.append(open_link(url, is_drained=False))
+        links = [LinkedVehicles(link, _speakers(fleet, wanted, start_ns)) for link in opened]
+        if not quiet:
+            numbers = ", ".join(f"mavlink:{number}" for number in fleet)
+            print(
+                f"{wanted.kind.value} {numbers} on {', '.join(str(link.url) for link in opened)}; Ctrl-C ends.",
+                flush=True,
+            )
+        with StopSignals() as stop:
+            first = next(iter(fleet.values()))
+
+            def is_over() -> bool:
+                is_late = wanted.seconds is not None and first.moment.time_s >= wanted.seconds
+                return is_late or stop() is not None
+
+            tell = (lambda text: None) if quiet else (lambda text: print(text, file=sys.stderr, flush=True))
+            serve(list(fleet.values()), links, speed=speed, asked_to_stop=is_over, tell=tell)
+    except LinkError as error:
+        raise UsageError(str(error)) from error
+    except OSError as error:
+        raise RunError(f"Sending failed: {(error.strerror or str(error)).lower()}.") from error
+    finally:
+        for link in opened:
+            link.close()
+    if not quiet:
+        print(f"sent {sum(one.sent for one in links)} MAVLink frames")
