@@ -21,14 +21,15 @@ from gateway.geodesy import wrap_rad
 from sim.earth import Flown
 from sim.faulty_sensors import faulty_gps, gps_sigma_m
 from sim.inertial_sayings import inertial_sayings
+from sim.mission_sayings import mission_sayings
 from sim.sayings import Fields, Sayings, boot_s, ticks
 from sim.scene import Aircraft, Scene
 from sim.sensors import GpsMeasured, GpsParameters, gps_phases, gps_times, measure_gps, stream
 
 Floats = NDArray[np.float64]
 
-_TYPES = {"aeroplane": 1, "copter": 2, "ship": 11}
-_AUTO_MODES = {"aeroplane": 10, "copter": 3, "ship": 10}
+_TYPES = {"aeroplane": 1, "airliner": 1, "copter": 2, "helicopter": 4, "ship": 11}
+_AUTO_MODES = {"aeroplane": 10, "airliner": 10, "copter": 3, "helicopter": 3, "ship": 10}
 _ARDUPILOT = 3
 _ARMED_AUTO, _DISARMED, _ACTIVE, _STANDBY = 0x9D, 0x1D, 4, 3
 _NO_FIX, _FIX_3D = 1, 3
@@ -47,6 +48,7 @@ def frames(scene: Scene, aircraft: Aircraft) -> Iterator[tuple[float, bytes]]:
         *_truths(scene, aircraft),
         *_positions(scene, aircraft),
         *inertial_sayings(scene, aircraft),
+        *mission_sayings(scene, aircraft),
     ]
     arrives = np.concatenate([one.arrives_s for one in sayings])
     which = np.repeat(np.arange(len(sayings)), [len(one.arrives_s) for one in sayings])

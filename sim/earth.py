@@ -25,8 +25,8 @@ _WGS84 = Geod(ellps="WGS84")
 class Flown:
     """The truth about an aircraft at times (...): geodetic position, velocity there (..., 3), attitude.
 
-    Roll is positive with the right wing down, pitch with the nose up, yaw clockwise from true north; there is
-    no wind in this world, so yaw is the course. `turn_radps` is positive to the right.
+    Roll is positive with the right wing down, pitch with the nose up, yaw clockwise from true north; on paths there is
+    no wind, so that yaw is the course and airspeed the speed. `turn_radps`, of the course, is positive to the right.
     """
 
     latitude_rad: Floats
@@ -37,6 +37,7 @@ class Flown:
     pitch_rad: Floats
     yaw_rad: Floats
     turn_radps: Floats
+    airspeed_mps: Floats
 
     @property
     def mode(self) -> NDArray[np.str_]:
@@ -81,6 +82,7 @@ def fly(path: Path, runway: Runway, time_s: ArrayLike) -> Flown:
         pitch_rad=np.arctan2(climb, speed),
         yaw_rad=np.where(moves, np.arctan2(east, north), runway.landing_compass_rad) % (2.0 * math.pi),
         turn_radps=turn,
+        airspeed_mps=np.linalg.norm(velocity, axis=-1),
     )
 
 

@@ -1,6 +1,6 @@
 """What an aircraft tells of the forces and rates that its inertial unit measures (HIGHRES_IMU), and of its airspeed (VFR_HUD).
 
-There is no wind for aircraft on paths, so that airspeed is speed; of thin air it is the indicated one.
+The airspeed is the indicated one: in thin air less than the true one.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def inertial_sayings(scene: Scene, aircraft: Aircraft) -> list[Sayings]:
         }
 
     samples = Sayings("HIGHRES_IMU", way.time_s[1:] + scene.say.latency_s, sample)
-    return [samples, _hud(scene, aircraft, generator)] if aircraft.craft == "aeroplane" else [samples]
+    return [samples, _hud(scene, aircraft, generator)] if aircraft.craft in ("aeroplane", "airliner") else [samples]
 
 
 def _ride(scene: Scene, aircraft: Aircraft, time_s: Floats) -> Ride:
@@ -58,11 +58,12 @@ def _ride(scene: Scene, aircraft: Aircraft, time_s: Floats) -> Ride:
 def _hud(scene: Scene, aircraft: Aircraft, generator: np.random.Generator) -> Sayings:
     at_s = ticks(scene, aircraft, scene.imu.airspeed_period_s)
     flown = scene.flown(aircraft, at_s)
-    speed = np.linalg.norm(flown.velocity_mps, axis=-1)
     thin = (
         1.0 - 2.255_77e-5 * flown.height_m
     ) ** 2.127_95  # root of the standard atmosphere's density against sea level
-    indicated = np.maximum(speed * thin + scene.imu.airspeed_sigma_mps * generator.standard_normal(len(at_s)), 0.0)
+    indicated = np.maximum(
+        flown.airspeed_mps * thin + scene.imu.airspeed_sigma_mps * generator.standard_normal(len(at_s)), 0.0
+    )
 
     def fields(index: int) -> Fields:
         east, north, up = flown.velocity_mps[index]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +11,7 @@ from gateway.settings import PositionSource, RadarSite, Site
 from sim.earth import Flown, fly
 from sim.faults import Fault
 from sim.faulty_sensors import clock_error_s
+from sim.flown_way import Craft, FlownWay
 from sim.paths import Path
 from sim.sensors import GpsParameters, ImuParameters, RadarParameters
 
@@ -34,15 +34,12 @@ class SayParameters:
     booted_before_s: float = 30.0  # how long before it appears its autopilot was switched on
 
 
-Craft = Literal["aeroplane", "copter", "ship"]
-
-
 @dataclass(frozen=True, slots=True)
 class Aircraft:
     """One aircraft: its MAVLink system number, the way it flies, and a word for people on what it is doing."""
 
     system: int
-    path: Path
+    path: Path | FlownWay
     kind: str = "approach"
     craft: Craft = "aeroplane"
     gps: GpsParameters | None = None  # its own position source; None: as the scene's
@@ -106,7 +103,8 @@ class Scene:
 
     def flown(self, aircraft: Aircraft, time_s: ArrayLike) -> Flown:
         """The truth about an aircraft at times (...), which must be within its presence."""
-        return fly(aircraft.path, self.site.runway, time_s)
+        way = aircraft.path
+        return way.flown(time_s) if isinstance(way, FlownWay) else fly(way, self.site.runway, time_s)
 
     def at_ns(self, time_s: float) -> int:
         """A time of the scene as ns since 1970 UTC."""

@@ -13,11 +13,12 @@ from sim.faults import Fault
 from sim.parameter_tables import GPS, IMU, RADAR, SAY, with_fields
 from sim.scenes.schemes import SCHEMES
 from sim.scenes.script import Script, Vehicle, Waypoint
-from sim.scenes.tables import DRAWN, FAULTS, SCENE, VEHICLE, WAYPOINT
+from sim.scenes.tables import DRAWN, FAULTS, SCENE, VEHICLE, WAYPOINT, WIND
 from sim.scenes.ways import WORDS
 from sim.sensors import GpsParameters
+from sim.vehicles.wind import WindParameters
 
-_TABLES = ("scene", "site", "gps", "imu", "say", "radar", "vehicle", "fault", *SCHEMES)
+_TABLES = ("scene", "site", "gps", "imu", "wind", "say", "radar", "vehicle", "fault", *SCHEMES)
 
 
 def read_scene(path: Path) -> Script:
@@ -61,6 +62,7 @@ def parse_scene(text: str, origin: str, folder: Path, name: str) -> Script:
         site=_site(document, site_file, text, origin, folder),
         gps=gps,
         imu=(rows("imu", IMU) or [{}])[0],
+        wind=WindParameters(**(rows("wind", WIND) or [{}])[0]),
         say=(rows("say", SAY) or [{}])[0],
         radars=tuple(rows("radar", RADAR)),
         vehicles=vehicles,
@@ -100,6 +102,8 @@ def _vehicle(row: dict[str, Any], index: int, own_gps: int, text: str, origin: s
         row["route"] = folder / route
         if not row["route"].is_file():
             raise SiteError(f"{where}: route {route!r} is no file in {folder}, and no word{hint(route, list(WORDS))}.")
+    if row.get("autopilot") and not isinstance(row["route"], Path):
+        raise SiteError(f'{where}: an autopilot flies a mission file; route names one, such as "round.plan".')
     if "gps" in row:
 
         def inside(key: str) -> str:

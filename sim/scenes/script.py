@@ -9,7 +9,8 @@ from typing import Any
 
 from gateway.settings import Site
 from sim.faults import Fault
-from sim.scene import Craft
+from sim.flown_way import Craft
+from sim.vehicles.wind import WindParameters
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +37,8 @@ class Vehicle:
     height_m: float | None = None
     begin_s: float = 0.0
     abeam_rad: float = 0.0  # the same way seen from the first radar at another bearing, positive to the left
+    autopilot: bool = False  # it flies its mission by itself, in the scene's wind
+    goes_around: int = 0  # so many landings are broken off, by an autopilot
     gps: Mapping[str, Any] = field(default_factory=dict)  # fields of GpsParameters that differ from the scene's
 
 
@@ -61,4 +64,5 @@ class Script:
     radars: tuple[Mapping[str, Any], ...] = ()
     vehicles: tuple[Vehicle, ...] = ()
     drawn: tuple[str, int] | None = None  # aircraft that are drawn by chance: which scheme, and how many
+    wind: WindParameters = WindParameters()
     faults: tuple[Fault, ...] = ()

@@ -7,14 +7,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from gateway.settings import DEMO_SITE, Site, SiteError
+from sim.flown_way import FlownWay
 from sim.overrides import SceneParameters, override, so_many
 from sim.parameter_tables import with_fields
-from sim.paths import Delayed, Path
+from sim.paths import Path
 from sim.scene import LARGEST_SYSTEM, Aircraft, Scene, SceneRadar
 from sim.scenes.placement import as_the_site_says, place_radars
 from sim.scenes.schemes import SCHEMES
 from sim.scenes.script import Script, Vehicle
-from sim.scenes.ways import beside, way_of
+from sim.scenes.ways import autopilots_way, beside, later, way_of
 from sim.sensors import GpsParameters, ImuParameters, RadarParameters
 
 FOLLOWING_S = 90.0  # from one aircraft to the next where a scene has more than are written
@@ -26,7 +27,7 @@ class _Placed:
 
     vehicle: Vehicle
     system: int
-    way: Path
+    way: Path | FlownWay
 
     @property
     def word(self) -> str:
@@ -85,7 +86,11 @@ def _placed(script: Script, site: Site, seed: int) -> list[_Placed]:
     found = []
     for index, vehicle in enumerate(script.vehicles, 1):
         system = next(free) if vehicle.system is None else vehicle.system
-        way = way_of(vehicle, site, seed, system, f"{script.origin}: [[vehicle]] {index}")
+        where = f"{script.origin}: [[vehicle]] {index}"
+        if vehicle.autopilot:
+            way: Path | FlownWay = autopilots_way(vehicle, script.wind, site, seed, system, where)
+        else:
+            way = way_of(vehicle, site, seed, system, where)
         found.append(_Placed(vehicle, system, way))
     return found
 
@@ -127,7 +132,7 @@ def _aircraft(
     if found and asked is not None:
         last, number = found[-1], max(one.system for one in found)
         more = range(1, asked - len(found) + 1)
-        found += [replace(last, system=number + at, path=Delayed(last.path, FOLLOWING_S * at)) for at in more]
+        found += [replace(last, system=number + at, path=later(last.path, FOLLOWING_S * at)) for at in more]
         found = found[:asked]
     if placed and parameters.abeam_deg:
         one = replace(placed[0].vehicle, abeam_rad=math.radians(parameters.abeam_deg))

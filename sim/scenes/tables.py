@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from gateway.settings.tables import Convert, Table, instant, number, text, whole
+from gateway.settings.tables import Convert, Table, flag, instant, number, text, whole
 from sim import faults
 from sim.faults import Fault
 from sim.faulty_sensors import COMPONENTS
@@ -58,12 +58,14 @@ SCENE = Table(
 VEHICLE = Table(
     {
         "system": ("system", whole(1, LARGEST_SYSTEM)),
-        "kind": ("craft", text("aeroplane", "copter", "ship")),
+        "kind": ("craft", text("aeroplane", "airliner", "copter", "helicopter", "ship")),
         "route": ("route", _route),
         "speed_mps": ("speed_mps", number(0.1, 1000.0)),
         "height_m": ("height_m", _HEIGHT),
         "begin_s": ("begin_s", number(-1e6, 1e6)),
         "abeam_deg": ("abeam_rad", number(-180.0, 180.0, scale=_RAD)),
+        "autopilot": ("autopilot", flag),
+        "goes_around": ("goes_around", whole(0, 10)),
         "gps": ("gps", _gps),
     },
     required=("route",),
@@ -78,6 +80,14 @@ WAYPOINT = Table(
         "height_m": ("height_m", _HEIGHT),
         "altitude_msl_m": ("altitude_msl_m", _HEIGHT),
         "speed_mps": ("speed_mps", _SPEED),
+    }
+)
+WIND = Table(
+    {
+        "speed_mps": ("speed_mps", number(0.0, 100.0)),
+        "from_deg": ("from_rad", _COMPASS),
+        "gust_sigma_mps": ("gust_sigma_mps", number(0.0, 30.0)),
+        "gust_length_m": ("gust_length_m", number(1.0, 1e4)),
     }
 )
 DRAWN = Table({"aircraft": ("aircraft", checked("aircraft", int))}, required=("aircraft",))
