@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from adapters import Arrival, Source
+from adapters.mavlink_frames import Frame, FrameEncoder, parse
+from adapters.mission_client import MissionClient
 from gateway import __version__
 from gateway.observation import Truth
 from gateway.runtime.folder import Record, make_folder, session_name
 from gateway.runtime.recorder import Recorder
 from gateway.settings import Options
 from gateway.sinks.batches import TRUTH, truth_batch
-from sim.scene import STAMP_STEP_NS
+from sim.scene import LARGEST_SYSTEM, STAMP_STEP_NS
 from sim.vehicles.flying import STEP_S
 from sim.vehicles.motion import Moment
-from sim.vehicles.speaking import Speaker
+from sim.vehicles.speaking import AUTOPILOT, Speaker
 
 _TRUTH_EVERY = 12  # steps of what flies: four times a second
 _TOLD_EVERY_S = 5.0
+_MISSION_PLANNER = 190  # MAV_COMP_ID_MISSIONPLANNER
 _AFTERWARDS_S = 5.0  # how long it goes on after the last vehicle has come to rest
 
 
@@ -42,12 +46,13 @@ def write_flight(
     folder = make_folder(parent, session_name(start_ns, "flight"))
     record = Record(__version__, command, Options(), start_ns, site, "the site file" if site else "", ended="done")
     recorder = Recorder(folder, record)
+    stations = [_Station(speaker) for speaker in speakers]
     for number, speaker in enumerate(speakers, 1):
         recorder.add(Source(number, "mavlink", f"mavlink-{speaker.encoder.system}", "simulated vehicle"))
     last, told_s, rows = start_ns, 0.0, list[Truth]()
     for steps, (which, moment, frames) in enumerate(_flown(speakers, longest_s)):
         at = start_ns + round(moment.time_s * 1e9)
-        for frame in frames:
+        for frame in (*frames, *stations[which].exchange(at)):
             last = max(at // STAMP_STEP_NS * STAMP_STEP_NS, last + STAMP_STEP_NS)
             recorder.keep(Arrival(last, which + 1, frame))
         if steps // len(speakers) % _TRUTH_EVERY == 0:
@@ -61,6 +66,36 @@ def write_flight(
     recorder.close()
     recorder.flush(last, {})
     return folder
+
+
+@dataclass(slots=True)
+class _Station:
+    """A ground station that reads a vehicle's mission once, as real ones do: recordings hold missions because of that."""
+
+    speaker: Speaker
+    _encoder: FrameEncoder = field(default_factory=lambda: FrameEncoder(LARGEST_SYSTEM, _MISSION_PLANNER))
+    _client: MissionClient | None = None
+
+    def exchange(self, now: int) -> list[bytes]:
+        """What both say at an instant, ns."""
+        if self._client is None:
+            self._client = MissionClient("", now)
+        said: list[bytes] = []
+        while (ask := self._client.due(now)) is not None:
+            name, values = ask
+            target = {"target_system": self.speaker.encoder.system, "target_component": AUTOPILOT}
+            said.append(self._encoder.encode(name, **target, **values))
+            for answer in self.speaker.hear(_parsed(said[-1]), now):
+                said.append(answer)
+                frame = _parsed(answer)
+                self._client.hear(frame.message, frame.payload, now)
+        return said
+
+
+def _parsed(raw: bytes) -> Frame:
+    frame = parse(raw)
+    assert frame is not None  # we have just made it
+    return frame
 
 
 def _flown(speakers: Sequence[Speaker], longest_s: float) -> Iterator[tuple[int, Moment, list[bytes]]]:
