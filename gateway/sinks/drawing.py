@@ -39,7 +39,7 @@ def _answer(target: BinaryIO, sink: RerunSink | None, refused: tuple[Any, ...] |
 
 
 def _give_way() -> None:
-    """Until now somebody waited for us."""
+    """With all threads that are begun from here on: on Linux each has a niceness of its own, and the viewer's has many."""
     if hasattr(os, "nice"):
         os.nice(_NICENESS)
 
@@ -52,8 +52,8 @@ def draw(source: BinaryIO, target: BinaryIO) -> None:
             what, about = asked
             if what == "open":
                 site, arguments = about
-                sink = RerunSink(site, **arguments)
                 _give_way()
+                sink = RerunSink(site, **arguments)
             elif what == "write_all":
                 assert sink is not None
                 (gathered,) = about
