@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from gateway.frames import RunwayFrame
+from gateway.frozen import made_swiftly
 from gateway.observation import RadarPlot, RadarStatus
 from gateway.settings import RadarSite
 
@@ -16,6 +17,7 @@ SECOND = 1_000_000_000
 NOTHING: Correction = (0.0, 0.0, 0.0, 0.0)
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True, eq=False)
 class Plot:
     """A radar plot, corrected: range m, azimuth rad, elevation rad, NaN = not measured; and what was taken off it."""

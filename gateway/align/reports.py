@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.frames import RunwayFrame, turn
+from gateway.frozen import made_swiftly
 from gateway.geodesy import geodetic_to_ecef
 from gateway.observation import GpsReport, Timing
 from gateway.settings import Site
@@ -38,6 +39,7 @@ class Local:
     has_height: bool
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True, eq=False)
 class Fix:
     """A GPS report in the runway's ENU. Ordered by (at, aircraft, serial).

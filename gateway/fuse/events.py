@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gateway.align import Fix, Plot, Polar
 from gateway.estimators.modes import Mixture
+from gateway.frozen import made_swiftly
 from gateway.fuse.headings import Heading
 
 Floats = NDArray[np.float64]
@@ -22,6 +23,7 @@ Belief = Mixture | Floats | None  # what an estimator keeps of a track beside me
 NEVER = -(1 << 62)
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True, eq=False)
 class Residual:
     """How far a measurement's k components were from where they were expected, (k,) each, NaN = not measured."""
@@ -44,6 +46,7 @@ class Residual:
 _HALF_ROOT = math.sqrt(0.5)
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True, eq=False)
 class Event:
     """A track's state after one of its measurements, and when each kind of source last saw it."""
@@ -86,6 +89,7 @@ class Event:
         return self.belief if isinstance(self.belief, Mixture) else None
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class Job:
     """Measurements of one track, in order, to be worked in after a state; without a state the first one starts it."""

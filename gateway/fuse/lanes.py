@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from gateway.align import SECOND, Plot
 from gateway.associate import Spans
+from gateway.frozen import made_swiftly
 from gateway.fuse.filtering import Event
 from gateway.settings import Options
 from gateway.track import Key, name_of
@@ -16,6 +17,7 @@ _TRACK = "track "  # no aircraft's name has a space
 EVENTS_AT_MOST = 1024  # of one track: a source of more than 100 measurements a second has a shorter history
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True, eq=False)
 class Lane:
     """One system track: an aircraft's, or a radar track's that is no aircraft (`key` and which of its free times)."""
@@ -135,6 +137,7 @@ class Joint:
     until: int | None = None
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class Lanes:
     """All system tracks; track numbers count from 1, and none is ever given to something else."""

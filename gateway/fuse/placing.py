@@ -155,7 +155,7 @@ def _inserted(lanes: Lanes, lane: Lane, measure: Measure, scene: Scene) -> tuple
         measure.serial,
         scene.headings.of(lane.aircraft),
     )
-    return lanes.with_lane(lane.with_events(events[:place])), job
+    return lanes if place == len(events) else lanes.with_lane(lane.with_events(events[:place])), job
 
 
 def _is_moot(measure: Measure, until: int) -> bool:

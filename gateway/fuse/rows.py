@@ -13,6 +13,7 @@ from gateway.align import SECOND, Fix, ReckonedFix
 from gateway.associate import Spans
 from gateway.estimators.kalman import ERROR, POSITION, SIZE, VELOCITY
 from gateway.frames import RunwayFrame, turn
+from gateway.frozen import made_swiftly
 from gateway.fuse.agreement import CONFIRMED
 from gateway.fuse.filtering import NEVER, Event, Job, carried_on, directions, run
 from gateway.fuse.lanes import Ended, Lane, Lanes, radar_names
@@ -59,6 +60,7 @@ class Fused:
     settled: tuple[Settled, ...] = ()  # states that nothing can change any more
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True, eq=False)
 class Row:
     """One row before its numbers are brought into the world's coordinates."""

@@ -14,6 +14,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from gateway.align import SECOND, Plot
+from gateway.frozen import made_swiftly
 
 if TYPE_CHECKING:
     from gateway.track.looks import Look
@@ -37,6 +38,7 @@ class Tracked:
     looks: tuple[Look, ...] = ()  # scans of unnumbered plots that were worked in this step
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class Place:
     """Where a radar track was lately: the newest range and azimuth that were measured (NaN = never), for a coarse look."""
@@ -63,6 +65,7 @@ class Place:
         )
 
 
+@made_swiftly
 @dataclass(frozen=True, slots=True)
 class RadarTracks:
     """The recent plots of every radar track, in order of time. A (radar, number, episode) never comes twice."""

@@ -3,7 +3,7 @@
 import copy
 import inspect
 import pickle
-from dataclasses import FrozenInstanceError, dataclass, fields, replace
+from dataclasses import FrozenInstanceError, dataclass, field, fields, replace
 from typing import get_args
 
 import pytest
@@ -55,3 +55,15 @@ def test_what_is_made_swiftly_is_made_as_ever() -> None:
     for wrong in ((), (1, 2, 3, 4)):
         with pytest.raises(TypeError, match=r"Swift.__init__\(\)"):
             Swift(*wrong)
+
+
+def test_what_a_factory_makes_belongs_to_one_instance() -> None:
+    @made_swiftly
+    @dataclass(frozen=True, slots=True)
+    class Holding:
+        first: int
+        held: list[int] = field(default_factory=list)
+
+    one, other = Holding(1), Holding(2)
+    one.held.append(3)
+    assert (one.held, other.held, Holding(3, [4]).held) == ([3], [], [4])

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from gateway.fuse import Fused
 from gateway.settings import Runway, Site
 from gateway.sinks.scene import columns, style
+from gateway.sinks.scene.deck import DeckScene
 from gateway.sinks.scene.entry import Always, Entry, entity
 from gateway.sinks.scene.flown import Flock, Flown
 from gateway.sinks.scene.lately import Lately
@@ -71,8 +72,9 @@ class Scope:
 class ScopeScene:
     """Draws the screen of one site, and everything that is on the approach."""
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, site: Site, deck: DeckScene | None = None) -> None:
         self._site, self._units, self.scope = site, style.units_of(site), Scope(site)
+        self._deck = deck or DeckScene(site)
         self._looked: Lately[str] = Lately()
 
     def entries(self, heard: Sequence[Positions], flights: Flock) -> list[Entry]:
@@ -80,7 +82,8 @@ class ScopeScene:
         entries: list[Entry] = []
         for one in heard:
             colour, size = (style.RADAR, 1.0) if one.is_plot else (style.GPS, 2.0)
-            entries += self._dots(raw_at, colour, size, one.sheaf, one.runway_m, one.has_height)
+            place = self._deck.place(one.sheaf.time, one.runway_m)
+            entries += self._dots(raw_at, colour, size, one.sheaf, place, one.has_height)
         all_of = flights.columns
         entries += self._dots(_fused_at, style.FUSED, 1.2, flights.sheaf, all_of.runway_m, all_of.has_height)
         return entries
@@ -109,7 +112,7 @@ class ScopeScene:
         entries: list[Entry] = []
         for key, _, end in seen.cuts():
             if self._looked.is_new(path_of(key), int(seen.time[end - 1])):
-                shade = style.UNNUMBERED if str(key).endswith(UNNUMBERED) else colour
+                shade = style.UNNUMBERED if isinstance(key, str) and key.endswith(UNNUMBERED) else colour
                 above = _ABOVE.get(shade, 30.0)
                 look = rr.Points2D.from_fields(colors=shade, radii=style.points(size), draw_order=above)
                 entries.append(Always(path_of(key), (look,)))
