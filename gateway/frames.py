@@ -6,6 +6,7 @@ component by component, never by a matrix product over many of them: the bits of
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import dataclass
 
@@ -36,8 +37,42 @@ def level_axes(compass_rad: float) -> Floats:
     return np.array([[sine, cosine, 0.0], [-cosine, sine, 0.0], [0.0, 0.0, 1.0]])
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class DeckPose:
+    """Where a runway that moves, a ship's deck, is at an instant, in the ENU of the place where the site has it written."""
+
+    at: int  # ns since 1970 UTC
+    enu_m: Floats  # (3,) its centre
+    velocity_mps: Floats  # (3,)
+    deck_from_enu: Floats  # (3, 3): x along its landing direction, y left, z its own vertical
+    compass_rad: float  # its landing direction, true
+    turn_radps: float  # clockwise
+
+    def relative(self, time: ArrayLike, enu_m: ArrayLike) -> Floats:
+        """Positions (..., 3) at times (...), ns, in the deck's frame as it is then: it goes on straight and turns steadily."""
+        since_s = (np.asarray(time, dtype=np.int64) - self.at) / 1e9
+        centre = self.enu_m + since_s[..., None] * self.velocity_mps
+        return self._turned(since_s, np.asarray(enu_m, dtype=np.float64) - centre)
+
+    def relative_velocity(self, time: ArrayLike, velocity_mps: ArrayLike) -> Floats:
+        """Velocities (..., 3) of the ENU less the deck's own, along its axes as they are at times (...).
+
+        Deviation: what the deck's turning adds far from it is left out: an aircraft's course is judged, not a rotation.
+        """
+        since_s = (np.asarray(time, dtype=np.int64) - self.at) / 1e9
+        return self._turned(since_s, np.asarray(velocity_mps, dtype=np.float64) - self.velocity_mps)
+
+    def _turned(self, since_s: Floats, vectors: Floats) -> Floats:
+        x, y, z = np.moveaxis(turn(self.deck_from_enu, vectors), -1, 0)
+        sine, cosine = np.sin(self.turn_radps * since_s), np.cos(self.turn_radps * since_s)
+        return np.stack([cosine * x - sine * y, sine * x + cosine * y, z], axis=-1)
+
+
 class RunwayFrame:
-    """The frames at the runway's centre: ECEF, ENU and runway (x along the main landing direction, y left, z up)."""
+    """The frames at the runway's centre: ECEF, ENU and runway (x along the main landing direction, y left, z up).
+
+    Everything is estimated in these, which stand still. Of a runway that moves `deck` says where it is now, once that is known.
+    """
 
     def __init__(self, runway: Runway) -> None:
         self.runway = runway
@@ -46,6 +81,33 @@ class RunwayFrame:
         self.ecef_from_enu = self.enu_from_ecef.T
         self.runway_from_enu = level_axes(runway.landing_compass_rad)
         self.enu_from_runway = self.runway_from_enu.T
+        self.deck: DeckPose | None = None
+
+    def with_deck(self, pose: DeckPose) -> RunwayFrame:
+        """The same frames with the runway somewhere else."""
+        moved = copy.copy(self)
+        moved.deck = pose
+        return moved
+
+    def deck_pose(
+        self, at: int, enu_m: Floats, velocity_mps: Floats, heading_rad: float, turn_radps: float
+    ) -> DeckPose:
+        """A deck at a place (3,) of the ENU, at the written height above the ellipsoid, under a ship on this heading.
+
+        The landing direction that is written counts from the ship's bow.
+        """
+        latitude, longitude, _ = self.geodetic_from_enu(enu_m)
+        centre = self.enu_from_geodetic(latitude, longitude, self.runway.height_m)
+        compass = heading_rad + self.runway.landing_compass_rad
+        axes = level_axes(compass) @ self.local_from_enu(latitude, longitude)
+        return DeckPose(at, centre, velocity_mps, axes, compass, turn_radps)
+
+    def relative(self, at: int, enu_m: Floats, velocity_mps: Floats) -> tuple[Floats, Floats]:
+        """Positions and velocities (..., 3) of the ENU, from the runway as it is at an instant, along its axes."""
+        if self.deck is None:
+            return turn(self.runway_from_enu, enu_m), turn(self.runway_from_enu, velocity_mps)
+        now = np.full(np.shape(enu_m)[:-1], at, dtype=np.int64)
+        return self.deck.relative(now, enu_m), self.deck.relative_velocity(now, velocity_mps)
 
     def enu_from_geodetic(self, latitude_rad: ArrayLike, longitude_rad: ArrayLike, height_m: ArrayLike) -> Floats:
         """East, north, up (..., 3) in metres at the runway's centre. Source: 003 2.2 eq 1, 2."""

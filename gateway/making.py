@@ -8,7 +8,7 @@ from dataclasses import replace
 from gateway import align, associate, fuse, predict, register, track
 from gateway.align import SECOND, Fix, Plot
 from gateway.associate import Change, MultiRadar, Setting, Spans
-from gateway.frames import RadarFrame
+from gateway.frames import DeckPose, RadarFrame
 from gateway.fuse import Adopted, Ended, Joint, Lanes, LifeChange, Scene, Settled
 from gateway.fuse.filtering import Job
 from gateway.fuse.rows import Row
@@ -35,6 +35,7 @@ class Making:
         self.counters, self.said, self.reported = dict(state.counters), state.said, state.reported
         self.consistency, self.predicting = state.consistency, state.predicting
         self.unnumbered, self.probing, self.reckoners = state.unnumbered, state.probing, state.reckoners
+        self.deck, self.poses = state.deck, list[DeckPose]()
         self.history = int(state.options.history_s * SECOND)
         self.wait = int(state.options.association_wait_s * SECOND)
         self.events: list[Event] = []
@@ -144,6 +145,7 @@ class Making:
             self.unnumbered,
             self.probing,
             self.reckoners,
+            self.deck,
         )
         observations = tuple(observation for arrival in self.heard for observation in arrival.observations)
         own = SourceHealth("gateway", "pipeline", 0.0, 0.0, 0, tuple(sorted(self.counters.items())))
@@ -162,5 +164,6 @@ class Making:
             health=replace(health, sources=(*health.sources, own)),
             events=tuple(self.events),
             reckoned=tuple(self.reckoned),
+            deck=tuple(self.poses),
         )
         return state, picture

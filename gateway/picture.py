@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from gateway.align import Aligned
 from gateway.associate import Associated
+from gateway.frames import DeckPose
 from gateway.fuse import Fused
 from gateway.observation import Observation, Truth
 from gateway.predict import Predicted
@@ -95,3 +96,4 @@ class Picture:
     events: tuple[Event, ...]
     reckoned: tuple[Reckoned, ...] = ()  # where dead reckoning had vehicles at the whole seconds of the step
     muted: tuple[MutedError, ...] = ()
+    deck: tuple[DeckPose, ...] = ()  # where a runway that follows a ship was at whole seconds of the step

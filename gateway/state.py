@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from gateway.align import Geoid
 from gateway.associate import Association, Change
+from gateway.estimators.deck import Deck
 from gateway.frames import RunwayFrame
 from gateway.fuse import Lanes
 from gateway.fuse.consistency import Consistency
@@ -42,6 +43,7 @@ class State:
     unnumbered: Unnumbered = Unnumbered()  # plots without a number, and what they are thought to be
     probing: Probing = Probing()  # which tracks are foretold to come near each other
     reckoners: Reckoners = Reckoners()  # of vehicles that tell how they move
+    deck: Deck | None = None  # of a runway that follows a ship
 
     def to_remember(self, at: int) -> Remembered | None:
         """What is known of the radars' errors, for the next session of this site; None where nothing is."""
@@ -56,4 +58,5 @@ def initial(site: Site, options: Options = Options(), remembered: Remembered | N
     age_s = 0.0 if remembered is None else remembered.age_s(began)
     registration = Registration(remembered=remembered, age_s=age_s)
     geoid = Geoid(site.runway.geoid_separation_m)
-    return State(site, options, RunwayFrame(site.runway), radars, geoid, registration=registration)
+    deck = None if site.runway.follows is None else Deck(site.runway.follows)
+    return State(site, options, RunwayFrame(site.runway), radars, geoid, registration=registration, deck=deck)

@@ -14,6 +14,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from statistics import median
+from typing import Any
 
 from gateway.frames import RunwayFrame
 from gateway.observation import FlightPlan, GpsReport, Observation, PlanPoint, VehicleStatus
@@ -197,7 +198,7 @@ def _direction(told: _Told) -> tuple[float, str]:
     return (heading, "of its nose") if heading is not None else (0.0, "north, for want of a better one")
 
 
-_SIZE = {"length_m": LENGTH_M, "width_m": WIDTH_M, "threshold_crossing_height_m": CROSSING_HEIGHT_M}
+_SIZE: dict[str, Any] = {"length_m": LENGTH_M, "width_m": WIDTH_M, "threshold_crossing_height_m": CROSSING_HEIGHT_M}
 
 
 def _proposal(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gateway.align import SECOND
-from gateway.frames import RunwayFrame, turn
+from gateway.frames import RunwayFrame
 from gateway.predict.approach import Deviations, deviations
 from gateway.settings import Runway, Stabilised
 
@@ -187,7 +187,7 @@ class Gates:
 
         `numbers` are those that people know the tracks by, `aircraft` who they are.
         """
-        place, flies = turn(frame.runway_from_enu, place_enu), turn(frame.runway_from_enu, velocity)
+        place, flies = frame.relative(at, place_enu, velocity)
         off = deviations(frame.runway, place, flies[:, 0])
         speed = np.sqrt(velocity[:, 0] ** 2 + velocity[:, 1] ** 2)
         on = on_final(off, flies) & has_height

@@ -66,6 +66,11 @@ def read_site(document: Mapping[str, Any], text: str, name: str, within: str = "
     runway = Runway(**rows("runway")[0])
     against = runway.landing_compass_rad + math.pi
     radars = tuple(RadarSite(**{"compass_boresight_rad": against, **row}) for row in rows("radar"))
+    if runway.follows is not None and radars:
+        raise SiteError(
+            f"{name}: [{within}runway] follows a ship, and [[{within}radar]] stands in its frame: radars on a deck "
+            "that moves are not understood; leave one of the two out."
+        )
     numbers = [radar.number for radar in radars]
     if len(set(numbers)) != len(numbers):
         twice = next(number for number in numbers if numbers.count(number) > 1)

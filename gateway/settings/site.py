@@ -19,7 +19,8 @@ SLOWEST_MPS = 25.0  # an aircraft that lands; birds and rain, with the wind, are
 
 @dataclass(frozen=True, slots=True)
 class Runway:
-    """The runway: its centre is the origin of the ENU and runway frames.
+    """The runway: its centre is the origin of the ENU and runway frames. One that `follows` a ship stands where it is written
+    until she is heard, and its frames stay there: `gateway.frames.RunwayFrame.deck` is where it is then.
 
     `threshold_x_m` (negative) and `glide_path_origin_x_m` follow from the length, the glide path and the crossing height.
     """
@@ -33,6 +34,9 @@ class Runway:
     width_m: float = 45.0
     glide_path_rad: float = math.radians(3.0)
     threshold_crossing_height_m: float = 15.0
+    follows: str | None = (
+        None  # the ship that carries it, such as "mavlink:7"; the landing direction counts from her bow
+    )
 
     @property
     def threshold_x_m(self) -> float:

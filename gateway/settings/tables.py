@@ -108,6 +108,7 @@ TABLES: dict[str, Table] = {
             "width_m": ("width_m", _POSITIVE),
             "glide_path_deg": ("glide_path_rad", number(0.5, 30.0, scale=_RAD)),
             "threshold_crossing_height_m": ("threshold_crossing_height_m", number(0.0, 500.0)),
+            "follows": ("follows", text()),
         },
         required=("latitude_deg", "longitude_deg", "height_m", "landing_direction_deg"),
     ),

@@ -54,6 +54,7 @@ def _runway(runway: Runway) -> list[str]:
         f"width_m = {runway.width_m:.1f}",
         f"glide_path_deg = {math.degrees(runway.glide_path_rad):.4f}",
         f"threshold_crossing_height_m = {runway.threshold_crossing_height_m:.2f}",
+        *([f"follows = {_quoted(runway.follows)}"] if runway.follows is not None else []),
     ]
 
 

@@ -19,6 +19,7 @@ from gateway.sinks.recording import optimise
 from gateway.sinks.scene.believed import BelievedScene
 from gateway.sinks.scene.clutter import ClutterScene
 from gateway.sinks.scene.conflicts import ConflictScene
+from gateway.sinks.scene.deck import DeckScene
 from gateway.sinks.scene.entry import Entry, made
 from gateway.sinks.scene.flown import Flights
 from gateway.sinks.scene.health import HealthScene
@@ -77,9 +78,14 @@ class RerunSink:
             if self._served:
                 self._served.close()
             raise
-        self._flights, self._sources, self._tracks = Flights(site), SourceScene(site), TrackScene(site)
+        self._deck = deck = DeckScene(site)
+        self._flights, self._sources, self._tracks = (
+            Flights(site, deck),
+            SourceScene(site, deck),
+            TrackScene(site, deck),
+        )
         self._approach, self._predict, self._stages = ApproachScene(site), PredictScene(site), StageScene(site)
-        self._scope, self._health, self._plans = ScopeScene(site), HealthScene(), PlanScene(site)
+        self._scope, self._health, self._plans = ScopeScene(site, deck), HealthScene(), PlanScene(site)
         self._smoothed, self._register, self._radars = SmoothedScene(site), RegisterScene(site), MultiRadarScene(site)
         self._clutter, self._conflicts = ClutterScene(site), ConflictScene(site)
         self._believed, self._reckoning, self._weather = BelievedScene(site), ReckoningScene(), WeatherScene(site)
@@ -155,8 +161,10 @@ class RerunSink:
         pictures, self._waiting, self._rows = self._waiting, [], 0
         if not pictures:
             return
+        moved = self._deck.entries(pictures)  # first: where the deck was is what the others are drawn from
         heard, flights = raw_positions(pictures), self._flights.gather(pictures)
         entries: list[Entry] = [
+            *moved,
             *self._sources.entries(pictures, heard),
             *self._scope.entries(heard, flights),
             *self._radars.entries(pictures),

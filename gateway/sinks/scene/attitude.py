@@ -7,13 +7,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gateway.frames import RunwayFrame
-
 Floats = NDArray[np.float64]
 
 
 def quaternion_from_attitude(
-    roll_rad: ArrayLike, pitch_rad: ArrayLike, yaw_rad: ArrayLike, landing_rad: float
+    roll_rad: ArrayLike, pitch_rad: ArrayLike, yaw_rad: ArrayLike, landing_rad: float | Floats
 ) -> Floats:
     """Quaternions (..., 4) of roll (right wing down), pitch (nose up) and yaw (clockwise from true north).
 
@@ -46,14 +44,14 @@ def quaternion_from_matrix(matrix: Floats) -> Floats:
     return np.asarray(best / np.linalg.norm(best, axis=-1, keepdims=True))
 
 
-def ellipsoid(frame: RunwayFrame, covariance: Floats, sigmas: float) -> tuple[Floats, Floats]:
+def ellipsoid(runway_from_enu: Floats, covariance: Floats, sigmas: float) -> tuple[Floats, Floats]:
     """Half axes (n, 3) in metres and orientation (n, 4) of the position part of covariances (n, 36), in runway axes.
 
     The covariance is in the local east, north, up; its tilt against the runway's (0.45 degrees at 50 km) is
     left out.
     """
     local = covariance.reshape(-1, 6, 6)[:, :3, :3]
-    turned = np.einsum("ij,njk,lk->nil", frame.runway_from_enu, local, frame.runway_from_enu)
+    turned = np.einsum("ij,njk,lk->nil", runway_from_enu, local, runway_from_enu)
     finite = np.isfinite(turned).all(axis=(1, 2))
     variances, axes = np.linalg.eigh(np.where(finite[:, None, None], turned, np.eye(3)))
     axes[np.linalg.det(axes) < 0.0, :, 0] *= -1.0  # a rotation, not a mirror

@@ -17,6 +17,7 @@ from gateway.frames import RunwayFrame, turn
 from gateway.observation import Attitude
 from gateway.picture import Picture
 from gateway.settings import Site
+from gateway.sinks.scene.deck import DeckScene
 from gateway.sinks.scene.lately import Lately
 from gateway.sinks.scene.sheaf import Sheaf
 
@@ -34,7 +35,7 @@ class Flown:
     track: int
     time: Ints
     step: Ints
-    runway_m: Floats  # (n, 3)
+    runway_m: Floats  # (n, 3); of a runway that moves, where it is from there at each time
     lat_lon_deg: Floats  # (n, 2)
     altitude_m: Floats  # above mean sea level, else above the ellipsoid
     has_height: Bools  # (n,); without one `altitude_m` is NaN and the third coordinate of `runway_m` is a guess
@@ -44,6 +45,9 @@ class Flown:
     modes: Floats  # (n, 3)
     bias_m: Floats  # (n, 3)
     attitude_rad: Floats  # (n, 3) roll, pitch, yaw
+    standing_m: Floats  # (n, 3) in the runway frame that stands still
+    along_mps: Floats  # (n,) along the runway, relative to it
+    compass_rad: Floats  # (n,) the direction of the x of `runway_m`
     aircraft: tuple[str | None, ...]
     callsign: tuple[str | None, ...]
     radar_track: tuple[str | None, ...]
@@ -65,6 +69,9 @@ class Columns:
     modes: Floats
     bias_m: Floats
     attitude_rad: Floats
+    standing_m: Floats
+    along_mps: Floats
+    compass_rad: Floats
 
 
 class Flock(Sequence[Flown]):
@@ -88,7 +95,8 @@ class Flock(Sequence[Flown]):
 class Flights:
     """Gathers the rows of tracks from pictures; remembers the newest of each and the last attitudes."""
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, site: Site, deck: DeckScene | None = None) -> None:
+        self._deck = deck or DeckScene(site)
         self._landing_rad = site.runway.landing_compass_rad
         self._frame = RunwayFrame(site.runway)
         self._newest: Lately[int] = Lately()
@@ -119,7 +127,7 @@ class Flights:
         sheaf = Sheaf.of([number for number, _ in tracks], [count for _, count in tracks], time, step)
         aircraft = text("aircraft")
         columns = Columns(
-            runway_m=place[order],
+            runway_m=self._deck.place(time, place[order]),
             lat_lon_deg=np.degrees(np.stack([column("latitude_rad")[order], column("longitude_rad")[order]], axis=-1)),
             altitude_m=np.where(np.isfinite(altitude), altitude, height),
             has_height=np.asarray(np.isfinite(height)),
@@ -129,6 +137,9 @@ class Flights:
             modes=column("modes")[order],
             bias_m=column("bias_m")[order],
             attitude_rad=self._attitude(aircraft, sheaf, velocity),
+            standing_m=place[order],
+            along_mps=self._deck.along_mps(time, velocity),
+            compass_rad=np.broadcast_to(self._deck.compass_rad(time), time.shape),
         )
         callsign, radar_track = text("callsign"), text("radar_track")
         state, life = (tuple(str(one) for one in text(name)) for name in ("state", "life"))

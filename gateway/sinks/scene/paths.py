@@ -41,7 +41,7 @@ class ApproachScene:
     def entries(self, flights: Flock) -> list[Entry]:
         """The rows of those tracks that are on the approach."""
         all_of = flights.columns
-        off = deviations(self._runway, all_of.runway_m, all_of.velocity_mps[:, 0])
+        off = deviations(self._runway, all_of.runway_m, all_of.along_mps)
         known = np.asarray(np.isfinite(off.distance_m))
         for above in (off.vertical_m, off.vertical_rad):
             above[~all_of.has_height] = np.nan
@@ -90,7 +90,7 @@ class PredictScene:
             for track, made, strips in self._made(picture.predict, known):
                 found.setdefault(track, []).append((made, picture.step, strips))
         for flown in flights:
-            self._here[flown.track] = flown.runway_m[-1], _direction(flown.velocity_mps[-1])
+            self._here[flown.track] = flown.standing_m[-1], _direction(flown.velocity_mps[-1])
         return self._rows(found) if found else []
 
     def end(self, track: int, at: int) -> None:
@@ -126,7 +126,7 @@ class PredictScene:
         if flown is not None:
             row = int(np.searchsorted(flown.time, made, side="right")) - 1
             if row >= 0:
-                return np.asarray(flown.runway_m[row]), _direction(flown.velocity_mps[row])
+                return np.asarray(flown.standing_m[row]), _direction(flown.velocity_mps[row])
         return self._here.get(track)
 
     def _rows(self, found: dict[int, list[tuple[int, int, list[Floats]]]]) -> list[Entry]:

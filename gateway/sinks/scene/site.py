@@ -64,9 +64,11 @@ class SiteScene:
         return drawn
 
     def lines(self, path: str, strips: list[Floats], colour: style.Colour, width: float) -> Always:
-        """Lines (runway frame) in the scene and on the map."""
+        """Lines (runway frame) in the scene and on the map; there not of a runway that moves: its ship's track is there."""
         radius = style.points(width)
         strips = [dense(strip) for strip in strips]
+        if self.site.runway.follows is not None:
+            return Always(path, (rr.LineStrips3D(strips, colors=colour, radii=radius),))
         return Always(
             path,
             (
@@ -80,6 +82,9 @@ class SiteScene:
     def labels(self, path: str, place: Floats, texts: list[str], colour: style.Colour, size: float = 2.0) -> Always:
         """Named points in the scene and (without their names: the map has none) on the map."""
         radius = style.points(size)
+        if self.site.runway.follows is not None:
+            points = rr.Points3D(place, labels=texts, show_labels=True, colors=colour, radii=radius)
+            return Always(path, (points,))
         return Always(
             path,
             (

@@ -15,6 +15,7 @@ from gateway.observation import GpsReport, RadarPlot, Truth
 from gateway.picture import Picture
 from gateway.settings import Site
 from gateway.sinks.scene import columns, style
+from gateway.sinks.scene.deck import DeckScene
 from gateway.sinks.scene.entry import Always, Entry, entity
 from gateway.sinks.scene.lately import Lately
 from gateway.sinks.scene.mapped import lat_lon_deg
@@ -67,8 +68,8 @@ def raw_positions(pictures: Sequence[Picture]) -> list[Positions]:
 class SourceScene:
     """Draws raw positions and truth; remembers the trail of each."""
 
-    def __init__(self, site: Site) -> None:
-        self._frame = RunwayFrame(site.runway)
+    def __init__(self, site: Site, deck: DeckScene | None = None) -> None:
+        self._frame, self._deck = RunwayFrame(site.runway), deck or DeckScene(site)
         self._geoid_m = site.runway.geoid_separation_m or 0.0
         self._trails: dict[str, Trail] = {}
         self._drawn: Lately[str] = Lately(self._trails.pop)
@@ -107,6 +108,7 @@ class SourceScene:
         if not len(place):
             return []
         lat_lon = lat_lon_deg(self._frame, place)
+        place = self._deck.place(sheaf.time, place)
         line = kind == "line"
         entries: list[Entry] = []
         extended = []

@@ -13,10 +13,10 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from gateway.frames import RunwayFrame
 from gateway.settings import Site
 from gateway.sinks.scene import columns, style
 from gateway.sinks.scene.attitude import ellipsoid, quaternion_from_attitude
+from gateway.sinks.scene.deck import DeckScene
 from gateway.sinks.scene.entry import Always, Entry, entity, rows
 from gateway.sinks.scene.flown import Flock, Flown
 from gateway.sinks.scene.lately import BEFORE_ALL
@@ -53,9 +53,8 @@ class _Drawn:
 class TrackScene:
     """Draws the rows of fused tracks; remembers what it drew of each."""
 
-    def __init__(self, site: Site) -> None:
-        self._units = style.units_of(site)
-        self._frame = RunwayFrame(site.runway)
+    def __init__(self, site: Site, deck: DeckScene | None = None) -> None:
+        self._units, self._deck = style.units_of(site), deck or DeckScene(site)
         self._longest_m = max(approach_reach_m(site) / 40.0, 40.0)
         self._drawn: dict[int, _Drawn] = {}
 
@@ -138,12 +137,12 @@ class TrackScene:
     def _symbol(self, flights: Flock, colours: Words) -> list[Entry]:
         place, sheaf = flights.columns.runway_m, flights.sheaf
         roll, pitch, yaw = flights.columns.attitude_rad.T
-        quaternion = quaternion_from_attitude(roll, pitch, yaw, self._frame.runway.landing_compass_rad)
+        quaternion = quaternion_from_attitude(roll, pitch, yaw, flights.columns.compass_rad)
         length = np.clip(0.1 * np.linalg.norm(place, axis=-1), 40.0, self._longest_m)
         covariance = flights.columns.covariance.reshape(-1, 6, 6).copy()
         flat = ~flights.columns.has_height  # a guess's hundreds of metres would hide everything else
         covariance[flat, 2, :] = covariance[flat, :, 2] = 0.0
-        half, axes = ellipsoid(self._frame, covariance, ELLIPSOID_SIGMAS)
+        half, axes = ellipsoid(self._deck.axes_from_enu, covariance, ELLIPSOID_SIGMAS)
         placed = columns.poses(place, quaternion, length)
         return [
             *sheaf.rows(lambda f: f"{entity('fuse', f.track)}/symbol", placed, columns.mesh_colours(colours)),

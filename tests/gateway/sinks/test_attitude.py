@@ -64,7 +64,7 @@ def test_an_ellipsoid_lies_in_runway_axes():
     covariance = np.diag([1.0, 10_000.0, 4.0, 1.0, 1.0, 1.0]).reshape(1, 36)
     for landing_rad, along in ((math.pi / 2, 1), (0.0, 0)):
         frame = RunwayFrame(replace(DEMO_SITE.runway, landing_compass_rad=landing_rad))
-        half, quaternion = ellipsoid(frame, covariance, 3.0)
+        half, quaternion = ellipsoid(frame.runway_from_enu, covariance, 3.0)
         longest = int(np.argmax(half[0]))
         assert half[0, longest] == pytest.approx(300.0)
         assert abs(turned(quaternion[0], np.eye(3)[longest])[along]) == pytest.approx(1.0)

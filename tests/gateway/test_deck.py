@@ -1,0 +1,183 @@
+"""A runway that follows a ship: who flies down the moving glide path is on it, and what is lost is carried on and said."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gateway.frames import RunwayFrame, level_axes
+from gateway.observation import Attitude, GpsReport, Observation
+from gateway.predict.approach import Deviations, deviations
+from gateway.settings import DEMO_SITE, Site, SiteError, format_site, parse_site
+from gateway.sinks.scene.deck import DeckScene
+from gateway.sinks.scene.flown import Flights
+
+Floats = NDArray[np.float64]
+Run = Any  # tests.gateway.conftest's
+
+SHIP, PLANE = "mavlink:7", "mavlink:1"
+RUNWAY = replace(
+    DEMO_SITE.runway,
+    landing_compass_rad=math.radians(350.0),  # a deck at ten degrees to the left of the bow
+    length_m=200.0,
+    width_m=30.0,
+    threshold_crossing_height_m=8.0,
+    follows=SHIP,
+)
+SITE = Site("carrier", RUNWAY)
+CLOSING_MPS, BEGINS_M, SECONDS = 60.0, 4000.0, 60.0
+
+
+def _sailed(turn_degps: float) -> Callable[[float], tuple[Floats, Floats, float]]:
+    """Place and velocity east, north, up and heading of a ship at times, that turns steadily and is set by a current."""
+
+    def at(t_s: float) -> tuple[Floats, Floats, float]:
+        heading, speed, rate = math.radians(50.0 + turn_degps * t_s), 8.0, math.radians(turn_degps)
+        start = math.radians(50.0)
+        east = speed * t_s * math.sin(start) if rate == 0.0 else speed / rate * (math.cos(start) - math.cos(heading))
+        north = speed * t_s * math.cos(start) if rate == 0.0 else speed / rate * (math.sin(heading) - math.sin(start))
+        through = np.array([speed * math.sin(heading), speed * math.cos(heading), 0.0])
+        current = np.array([0.6, -0.8, 0.0])
+        return np.array([east, north, 0.0]) + current * t_s, through + current, heading
+
+    return at
+
+
+def _aboard(
+    world: Any, turn_degps: float = 0.0, silent_from_s: float = math.inf, yaws_deg: float = 0.0
+) -> list[Observation]:
+    """A ship, and an aircraft down her glide path: positions once a second, velocities by differences, attitudes of the ship."""
+    frame, sailed = RunwayFrame(RUNWAY), _sailed(turn_degps)
+
+    def flown(t_s: float) -> Floats:
+        place, _, heading = sailed(t_s)
+        before_m = BEGINS_M - CLOSING_MPS * t_s
+        relative = np.array([RUNWAY.aiming_point_x_m - before_m, 0.0, before_m * math.tan(RUNWAY.glide_path_rad)])
+        return place + level_axes(heading + RUNWAY.landing_compass_rad).T @ relative
+
+    def report(who: str, t_s: float, place: Floats, velocity: Floats) -> GpsReport:
+        latitude, longitude, height = (float(one) for one in frame.geodetic_from_enu(place))
+        east, north, up = (float(one) for one in velocity)
+        at = world.at(t_s)
+        said = {
+            "velocity_east_mps": east,
+            "velocity_north_mps": north,
+            "velocity_up_mps": up,
+            "velocity_sigma_mps": 0.2,
+        }
+        return GpsReport(
+            who,
+            at,
+            at + 100_000_000,
+            latitude,
+            longitude,
+            height_m=height,
+            horizontal_sigma_m=1.5,
+            vertical_sigma_m=1.5,
+            **said,
+        )
+
+    found: list[Observation] = []
+    for k in range(round(2.0 * SECONDS)):
+        t_s = 0.5 * k
+        if k % 2:
+            found.append(report(PLANE, t_s, flown(t_s), (flown(t_s + 0.01) - flown(t_s - 0.01)) / 0.02))
+        if t_s < silent_from_s:
+            place, velocity, heading = sailed(t_s)
+            if k % 2 == 0:
+                found.append(report(SHIP, t_s, place, velocity))
+            yaw = heading + math.radians(yaws_deg) * math.sin(0.8 * t_s)
+            found.append(Attitude(SHIP, world.at(t_s), world.at(t_s + 0.02), 0.0, 0.0, yaw))
+    return found
+
+
+def _off(pictures: Any, site: Site = SITE) -> tuple[Floats, Deviations]:
+    """When, and how far the aircraft was off, as it is drawn in /approach."""
+    deck = DeckScene(site)
+    deck.entries(pictures)
+    flights = Flights(site, deck).gather(pictures)
+    number, columns = next(n for n, one in enumerate(flights) if PLANE in one.aircraft), flights.columns
+    (_, start, end) = (
+        flights.sheaf.cuts()[number] if isinstance(flights.sheaf.cuts(), list) else list(flights.sheaf.cuts())[number]
+    )
+    off = deviations(site.runway, columns.runway_m[start:end], columns.along_mps[start:end])
+    return flights[number].time, off
+
+
+@pytest.fixture(scope="module")
+def straight(world: Any) -> Run:
+    """A ship that sails straight on, and the aircraft that lands on her."""
+    run: Run = world.with_site(SITE).run(_aboard(world))
+    return run
+
+
+@pytest.mark.parametrize(("turn_degps", "within_m"), [(0.0, 0.5), (0.3, 8.0)])
+def test_who_flies_down_the_moving_glide_path_is_on_it(
+    world: Any, straight: Run, turn_degps: float, within_m: float
+) -> None:
+    """Once the heading is known: less than half a metre off, straight on; in a turn what the filter of a track lags."""
+    run = world.with_site(SITE).run(_aboard(world, turn_degps)) if turn_degps else straight
+    time, off = _off(run.pictures)
+    late = time > world.at(18.0)
+    assert np.abs(off.vertical_m[late]).max() < within_m
+    assert np.abs(off.lateral_m[late]).max() < within_m
+    assert off.distance_m[-1] == pytest.approx(
+        off.distance_m[late][0] - CLOSING_MPS * (time[-1] - time[late][0]) / 1e9, abs=5.0
+    )
+
+
+def test_without_following_the_same_aircraft_is_far_off(straight: Run) -> None:
+    """Seen from where the runway is written it is on no approach, but for the moments in which it crosses one."""
+    _, off = _off(straight.pictures, replace(SITE, runway=replace(RUNWAY, follows=None)))
+    assert np.isfinite(off.lateral_m).mean() < 0.2
+
+
+def test_waves_hardly_move_the_deck(world: Any) -> None:
+    """Two degrees of yawing, which would be 140 m at 4 km, leave a tenth of that."""
+    time, off = _off(world.with_site(SITE).run(_aboard(world, yaws_deg=2.0)).pictures)
+    assert np.nanmax(np.abs(off.lateral_rad[time > world.at(32.0)])) < math.radians(2.0) / 10.0
+
+
+def test_ticks_do_not_move_the_deck(world: Any) -> None:
+    """One arrival at a time, in ticks of 20 ms and all at once: the same rows, poses and sentences, bit for bit."""
+    told, here = _aboard(world, 0.3, silent_from_s=10.0, yaws_deg=2.0)[:130], world.with_site(SITE)
+    runs = [here.run(told, ticks=ticks, until_s=44.0) for ticks in ("one", "20 ms", "all")]
+    poses = [
+        [(pose.at, pose.enu_m.tobytes(), pose.deck_from_enu.tobytes()) for one in run.pictures for pose in one.deck]
+        for run in runs
+    ]
+    assert len(poses[0]) > 35
+    assert poses[0] == poses[1] == poses[2]
+    assert runs[0].bits() == runs[1].bits() == runs[2].bits()
+    assert [(e.at, e.text) for e in runs[0].events] == [(e.at, e.text) for e in runs[2].events]
+
+
+def test_a_ship_that_is_lost_is_carried_on_and_that_is_said(world: Any) -> None:
+    """Silent from 30 s on, straight: the aircraft is still less than three metres off 25 s later; both are said once."""
+    run = world.with_site(SITE).run(_aboard(world, silent_from_s=30.0), until_s=90.0)
+    time, off = _off(run.pictures)
+    late = (time > world.at(18.0)) & (time < world.at(58.0))
+    assert np.abs(off.lateral_m[late]).max() < 3.0
+    for words in ("is heard: the runway is where she is", "is silent: the runway is carried on", "is lost"):
+        assert len(run.said(words)) == 1, words
+
+
+def test_the_aircraft_passes_its_gate_stabilised(straight: Run) -> None:
+    """The gates are judged from the deck: it passes the lower one, stabilised, and no alert is said."""
+    run = straight
+    assert run.said("passes the gate")
+    assert not run.said("not stabilised")
+    assert not run.said("on final")
+
+
+def test_a_site_that_follows_is_written_and_read_again() -> None:
+    """What format_site writes, parse_site reads; with a radar it is refused, and told why."""
+    assert parse_site(format_site(SITE)).runway.follows == SHIP
+    with pytest.raises(SiteError, match="radars on a deck that moves are not understood"):
+        parse_site(format_site(replace(SITE, radars=DEMO_SITE.radars)))
