@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -121,8 +121,8 @@ def repair_one(session: Listed) -> Listed:
     return mended
 
 
-def compact_one(session: Listed) -> int | None:
-    """The unit of work of --compact: the session's size afterwards, None where there was nothing to do. Raises RunError."""
+def compact_one(session: Listed) -> Listed | None:
+    """The unit of work of --compact: the session as it is afterwards, None where there was nothing to do. Raises RunError."""
     from gateway.runtime.listing import look
     from gateway.runtime.outputs import RRD_FILE
     from gateway.sinks.hold import is_held
@@ -139,7 +139,7 @@ def compact_one(session: Listed) -> int | None:
         raise RunError(
             f"{path} could not be compacted: Rerun cannot make sense of it, or the disk is full; it is as it was."
         )
-    return look(session.folder).size_bytes if done else None
+    return look(session.folder) if done else None
 
 
 def _repair(rows: Sequence[Row], crew: Crew, telling: take.Telling) -> list[dict[str, str]]:
@@ -160,7 +160,8 @@ def _compact(rows: Sequence[Row], crew: Crew, telling: take.Telling) -> list[dic
     for row, outcome in zip(rows, outcomes, strict=True):
         if outcome.result is not None:
             row.was_bytes = row.session.size_bytes
-            row.done.append(f"compacted to {_size(outcome.result)}")
+            row.done.append(f"compacted, {_size(row.was_bytes)} before")
+            row.session = replace(outcome.result, mended=row.session.mended)
     return failures([row.session.folder for row in rows], outcomes)
 
 
