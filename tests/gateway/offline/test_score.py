@@ -1,10 +1,12 @@
 """Score: what is known to be wrong by so much is told to be, along, across and in sigmas."""
 
 import math
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
+from gateway.offline.pooled import pooled
 from gateway.offline.score import Errors, Foretold, Way, errors, joined, scores
 
 SECOND = 1_000_000_000
@@ -86,3 +88,17 @@ def test_nothing_foretold_has_no_rows() -> None:
     """An empty session has an empty table."""
     nothing: Errors = joined([])
     assert scores(nothing) == []
+
+
+def test_pooled_scores_are_those_of_all_predictions_together() -> None:
+    """Of sessions with unlike numbers of predictions, some without a height; groups that one of them lacks."""
+    low, high = foretold([5, 9, 14], 10.0, 5.0, 2.0), foretold([6], 20.0, 31.0, -8.0, sigma=4.0)
+    unknown = replace(foretold([3, 7], 10.0, 15.0, 1.0), height=np.full(2, np.nan), method=np.full(2, "two segments"))
+    parts = [[errors(told, way(60), way(60)) for told in some] for some in ((low, high), (unknown,), ())]
+    together = pooled(scores(joined(some)) for some in parts)
+    expected = scores(joined([one for some in parts for one in some]))
+    by_row = {(row.group, row.horizon_s): row for row in together}
+    assert len(by_row) == len(expected)
+    for row in expected:
+        found, wanted = asdict(by_row[row.group, row.horizon_s]), asdict(row)
+        assert all(found[name] == pytest.approx(wanted[name], nan_ok=True) for name in wanted if name != "group")
