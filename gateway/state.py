@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from gateway.align import Geoid
@@ -11,7 +11,7 @@ from gateway.estimators.deck import Deck
 from gateway.frames import RunwayFrame
 from gateway.fuse import Lanes
 from gateway.fuse.consistency import Consistency
-from gateway.predict import Predicting, Probing
+from gateway.predict import ArrivalFlow, FlowWays, Predicting, Probing
 from gateway.reckon import Reckoners
 from gateway.register import Registration, Remembered
 from gateway.settings import Options, RadarSite, Site
@@ -52,11 +52,22 @@ class State:
         return self.registration.to_remember(self.radars, at, where)
 
 
-def initial(site: Site, options: Options = Options(), remembered: Remembered | None = None, began: int = 0) -> State:
-    """The state before the first arrival. `remembered`: of the site's radars, older by now, `began`, ns since 1970 UTC."""
+def initial(
+    site: Site,
+    options: Options = Options(),
+    remembered: Remembered | None = None,
+    began: int = 0,
+    flows: Sequence[ArrivalFlow] = (),
+) -> State:
+    """The state before the first arrival. `remembered`: of the site's radars, older by now, `began`, ns since 1970 UTC.
+
+    `flows`: ways that arrivals come.
+    """
     radars = {radar.number: radar for radar in site.radars}
     age_s = 0.0 if remembered is None else remembered.age_s(began)
     registration = Registration(remembered=remembered, age_s=age_s)
     geoid = Geoid(site.runway.geoid_separation_m)
+    frame = RunwayFrame(site.runway)
+    predicting = Predicting(flows=FlowWays.of(flows, site, frame))
     deck = None if site.runway.follows is None else Deck(site.runway.follows)
-    return State(site, options, RunwayFrame(site.runway), radars, geoid, registration=registration, deck=deck)
+    return State(site, options, frame, radars, geoid, registration=registration, predicting=predicting, deck=deck)

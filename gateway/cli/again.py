@@ -47,11 +47,13 @@ class Wanted:
         if self.smooth:
             check_smoothing(options)
         playback, options = self.section.cut(playback, options)
+        flows = take.read_flows(self.methods.flows)
         has_own_place = self.place is not None or playback.place is not None
         return playback, Setup(
             place=self.place or playback.place or playback.find_place(),
             options=options,
             remembered=playback.remembered,
+            flows=playback.flows if flows is None else flows,
             keys=self.keys,
             signing_key=self.signing_key,
             smooth=self.smooth,

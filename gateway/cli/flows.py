@@ -12,6 +12,7 @@ import typer
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
 from gateway.cli.many import Crew, expanded, failures, tell_failures
+from gateway.cli.places import read_place_deg
 from gateway.cli.spread import spread
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ def flows(
     chosen = next((one for one in METHODS if one == method), None)
     if chosen is None:
         raise UsageError(f"--method {method!r} is none of {', '.join(METHODS)}.")
-    where = None if airport is None else _read_airport(airport)
+    where = None if airport is None else read_place_deg(airport, "--airport")
     paths = expanded(files, crew)
     flights, failed = _read(paths, crew, show=not telling.quiet)
     try:
@@ -93,7 +94,7 @@ def flows(
             "--method default needs scikit-learn, which is not installed: pip install 'talkdown[flows]', or --method jaccard."
         ) from error
     if archive is not None:
-        _archive(archive, tracks, result)
+        _archive(archive, tracks, result, where)
     if telling.json:
         print(text.dumps(_document(tracks, result, where, left_out) | {"failed": failed}))
     elif not telling.quiet:
@@ -124,24 +125,16 @@ def flights_one(path: Path) -> list[Flight]:
         raise RunError(f"{path} could not be read: {(error.strerror or str(error)).lower()}.") from error
 
 
-def _read_airport(written: str) -> tuple[float, float]:
-    try:
-        latitude, longitude = (float(part) for part in written.split(","))
-    except ValueError:
-        latitude = longitude = math.nan
-    if not (abs(latitude) < 89.0 and abs(longitude) <= 180.0):
-        raise UsageError(f"--airport {written!r} is not understood: write degrees as in 49.01,2.55.")
-    return latitude, longitude
-
-
-def _archive(folder: Path, tracks: tuple[Track, ...], result: Flows) -> None:
-    """memberships.parquet, flows.parquet (mean tracks), flows.rrd."""
-    from gateway.runtime.flow_tables import write_flows
+def _archive(folder: Path, tracks: tuple[Track, ...], result: Flows, airport_deg: tuple[float, float]) -> None:
+    """memberships.parquet, flows.parquet (mean tracks), flows.json (as predictions take them up), flows.rrd."""
+    from gateway.runtime.flow_tables import ways_of, write_flows
+    from gateway.runtime.flow_ways import write_ways
     from gateway.sinks.flows import draw
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_flows(tracks, result, folder)
+        write_ways(ways_of(result.flows, airport_deg), airport_deg, folder)
         draw(tracks, result, folder / "flows.rrd")
     except OSError as error:
         raise RunError(f"{folder} could not be written: {(error.strerror or str(error)).lower()}.") from error

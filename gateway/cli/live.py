@@ -139,6 +139,7 @@ def _setup(
         keys=take.read_keys(place, site),
         signing_key=signing_key,
         live=True,
+        flows=take.read_flows(methods.flows),
         takes_up=methods.registration is not take.Registration.off,
         command=tuple(sys.argv[1:]),
     )

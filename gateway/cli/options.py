@@ -12,6 +12,7 @@ import typer
 from gateway.cli.failures import UsageError
 
 if TYPE_CHECKING:
+    from gateway.predict import ArrivalFlow
     from gateway.runtime.setup import Place, Serve
     from gateway.runtime.urls import Url
     from gateway.settings import Options
@@ -142,6 +143,18 @@ QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progre
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the summary as one JSON object.")]
 
 
+FlowsOption = Annotated[
+    str | None,
+    typer.Option(
+        "--flows",
+        metavar="FILE|DIR|off",
+        help="Ways that arrivals come, as `talkdown flows` found them: where aircraft without a plan may go. "
+        "(default: of a session its own, live those in the archive)",
+        show_default=False,
+    ),
+]
+
+
 @dataclass(frozen=True, slots=True)
 class Methods:
     """How tracks are made, for a session that begins."""
@@ -151,6 +164,7 @@ class Methods:
     association: AssociationOption = Association.default
     registration: RegistrationOption = Registration.apply
     dead_reckoning: DeadReckoningOption = DeadReckoning.on
+    flows: FlowsOption = None
 
     def options(self) -> Options:
         """The options of a run."""
@@ -207,6 +221,20 @@ def read_keys(place: Place | None, site_path: Path | None) -> dict[int, bytes]:
             if not keys[radar.number]:
                 raise UsageError(f"The key file of radar {radar.number}, {path}, is empty.")
     return keys
+
+
+def read_flows(given: str | None) -> tuple[ArrivalFlow, ...] | None:
+    """The arrival flows that --flows names; none where it says off; None where it is not given. Raises UsageError."""
+    if given is None:
+        return None
+    if given == "off":
+        return ()
+    from gateway.runtime.flow_ways import FlowsError, read_ways
+
+    try:
+        return read_ways(Path(given))[0]
+    except FlowsError as error:
+        raise UsageError(str(error)) from error
 
 
 def read_signing_key(path: Path | None) -> bytes | None:

@@ -119,6 +119,7 @@ class Methods:
             show_default=False,
         ),
     ] = None
+    flows: take.FlowsOption = None
 
     def change(self, options: Options) -> Options:
         """The options with what was asked for in place of what was archived."""

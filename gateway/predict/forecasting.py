@@ -74,6 +74,7 @@ def forecast(
     before = predicting.remembered.of(tracks)
     state = State.of(lanes, at, model)
     gates, judged = _on_final(predicting.gates, tracks, numbers, lanes, at, state, site, frame)
+    goals = goals if predicting.flows is None else predicting.flows.along(goals, state)
     goals = weather.around(goals, state, weather.areas(predicting.tellings, site, frame, at, separation_m))
     predicting, stacked = predicting.stacked(lanes[0].track, goals)
     usual = level_turn_rate(state.speed, site.estimation.bank_rad, site.estimation.turn_rate_rps)

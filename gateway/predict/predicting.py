@@ -11,6 +11,7 @@ from gateway.align import SECOND
 from gateway.frames import RunwayFrame
 from gateway.fuse import Headings, Lane
 from gateway.observation import WeatherArea
+from gateway.predict.arrival_flows import FlowWays
 from gateway.predict.gates import Gates
 from gateway.predict.goals import Goals, goals_of
 from gateway.predict.minds import Remembered
@@ -34,6 +35,7 @@ class Predicting:
     planned: tuple[tuple[int, tuple[int, ...]], ...] = ()  # when which tracks are predicted next
     gates: Gates = Gates()  # what is remembered of finals
     stacks: Mapping[int, Stacked] = field(default_factory=dict)  # goals of parts, by their first tracks
+    flows: FlowWays | None = None  # ways that many came
     headings: Headings = Headings()  # where aircraft say they go, as the filter of several modes uses it
 
     @property
@@ -105,7 +107,7 @@ class Predicting:
         if len(tellings.by_aircraft) < len(self.tellings.by_aircraft):
             goals = {one: goal for one, goal in goals.items() if one is None or one in tellings.by_aircraft}
         if not lanes:
-            return Predicting(tellings)
+            return Predicting(tellings, flows=self.flows)
         remembered, gates = self.remembered.without(lanes), self.gates.without(lanes)
         return replace(self, tellings=tellings, goals=goals, remembered=remembered, gates=gates)
 

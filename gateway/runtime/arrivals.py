@@ -55,8 +55,7 @@ def arrivals_among(
     if airport_deg is None:
         airport_deg = float(np.median(ends[:, 1])), float(np.median(ends[:, 2]))
     ground_m = float(np.median(ends[:, 3]))
-    latitude, longitude = airport_deg
-    onto = Proj(proj="lcc", lat_1=latitude - 0.5, lat_2=latitude + 0.5, lat_0=latitude, lon_0=longitude)
+    onto = onto_level(airport_deg)
     tracks = []
     for name, rows in flights:
         east, north = onto(rows[:, 2], rows[:, 1])
@@ -64,6 +63,12 @@ def arrivals_among(
         if len(track.time_s) >= LEAST_POINTS and track.place_m[-1, 2] < _LOW_M:
             tracks.append(track)
     return tuple(tracks), airport_deg, len(flights) - len(tracks)
+
+
+def onto_level(airport_deg: tuple[float, float]) -> Proj:
+    """Lambert's conformal conic about an airport (latitude, longitude, degrees). Source: 002-7 1.2."""
+    latitude, longitude = airport_deg
+    return Proj(proj="lcc", lat_1=latitude - 0.5, lat_2=latitude + 0.5, lat_0=latitude, lon_0=longitude)
 
 
 def _of_table(path: Path) -> list[Flight]:

@@ -17,7 +17,9 @@ from pathlib import Path
 from typing import Any, cast
 
 from adapters import Kind, Source
+from gateway.predict import ArrivalFlow
 from gateway.register import Remembered
+from gateway.runtime.flow_ways import read_archived
 from gateway.runtime.remembering import is_of, read_remembered
 from gateway.runtime.setup import Setup
 from gateway.runtime.typed import misfit
@@ -67,7 +69,7 @@ class Record:
     epoch_offset_s: int | None = None
     registration: Remembered | None = None  # what was known of the radars' errors at the start, from an earlier session
     registered: Remembered | None = None  # and what is known of them by now
-    flows: None = None  # other programs look for it; null until predictions know arrival flows
+    flows: tuple[ArrivalFlow, ...] = ()  # ways that arrivals come, as they were known at the start
     sources: tuple[InputFile, ...] = ()
     counters: Mapping[str, int] = field(default_factory=dict)
     watermark: int | None = None
@@ -170,6 +172,7 @@ def _record(document: dict[str, Any]) -> Record:
     plain["options"] = read_options(document["options"])
     plain["sources"] = tuple(_input_file(row) for row in document["sources"])
     plain |= {name: read_remembered(plain.get(name)) for name in ("registration", "registered")}
+    plain["flows"] = read_archived(plain.get("flows"))
     record = Record(**plain)
     numbers = [source.number for source in record.sources]
     spoiled = misfit(record) or _out_of_range(record) or ("sources" if len(set(numbers)) < len(numbers) else None)

@@ -17,6 +17,7 @@ from typing import Protocol
 from adapters import Arrival, Source
 from adapters.files import FileError, kind_of, open_recording
 from adapters.tlog import STEP_NS
+from gateway.predict import ArrivalFlow
 from gateway.register import Remembered
 from gateway.runtime.folder import InputFile, read_record
 from gateway.runtime.inputs import SessionInput
@@ -56,6 +57,7 @@ class Playback:
     place: Place | None = None
     options: Options = field(default_factory=Options)
     remembered: Remembered | None = None  # what was known of the radars' errors at the session's start
+    flows: tuple[ArrivalFlow, ...] = ()  # ways that arrivals come, as they were known then
     signing_key: bytes | None = None  # with one, only frames that are signed with it tell of the place
     _read_bytes: int = 0
     _overview: Overview | None = None
@@ -158,7 +160,9 @@ def _of_session(folder: Path) -> Playback:
         except SiteError as error:
             raise FileError(str(error)) from error
     inputs = tuple(_input(folder, one) for one in record.sources)
-    return Playback(inputs, record.started_at, record.watermark, place, record.options, record.registration)
+    return Playback(
+        inputs, record.started_at, record.watermark, place, record.options, record.registration, record.flows
+    )
 
 
 def _input(folder: Path, described: InputFile) -> SessionInput:

@@ -19,7 +19,9 @@ from gateway import __version__
 from gateway.observation import Heard
 from gateway.picture import Picture
 from gateway.pipeline import State, initial, step
+from gateway.predict import ArrivalFlow
 from gateway.predict.told import known_points
+from gateway.runtime.flow_ways import FlowsError, flows_near
 from gateway.runtime.folder import Record, make_folder, remembered_for, session_name
 from gateway.runtime.hearing import Hearing
 from gateway.runtime.opening import Opening
@@ -28,6 +30,7 @@ from gateway.runtime.places import PlaceFinder
 from gateway.runtime.recorder import Recorder
 from gateway.runtime.setup import Place, RunFailure, Setup
 from gateway.runtime.summary import Summary, Tally
+from gateway.settings import Site
 from gateway.sinks.aside import Aside, AtOnce
 
 _FLUSH_NS = 500_000_000  # of wall time: half of the second that a kill may cost
@@ -95,14 +98,29 @@ class Run:
         """From now on the place is known: the pipeline and the sinks can begin."""
         self.place = place
         remembered = remembered_for(self.setup, place.site)
-        self._state = initial(place.site, self.setup.options, remembered, self.started_at)
+        flows = self._flows(place.site)
+        self._state = initial(place.site, self.setup.options, remembered, self.started_at, flows)
         self._tally = Tally(place.site.runway)
         if self._recorder is not None:
-            self._recorder.describe(site=place.text, site_origin=place.origin, registration=remembered)
+            self._recorder.describe(site=place.text, site_origin=place.origin, registration=remembered, flows=flows)
         try:
             self.outputs = Outputs(place.site, self.folder, self.setup, self._aside)
         except OSError as error:
             raise self._failure(error) from error
+
+    def _flows(self, site: Site) -> tuple[ArrivalFlow, ...]:
+        """Ways that arrivals come here; where none are given, those that lie in the archive of a live session."""
+        if self.setup.flows is not None or not self.setup.live or self.setup.archive is None:
+            return self.setup.flows or ()
+        try:
+            flows = flows_near(self.setup.archive, site)
+        except FlowsError as error:
+            self._untold = (*self._untold, ("warning", str(error)))
+            return ()
+        if flows:
+            said = f"{len(flows)} arrival flows of {self.setup.archive} tell where aircraft without a plan may go."
+            self._untold = (*self._untold, ("info", said))
+        return flows
 
     def add(self, source: Source) -> None:
         """A source that is new."""

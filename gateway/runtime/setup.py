@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from gateway.predict import ArrivalFlow
 from gateway.register import Remembered
 from gateway.runtime.urls import Url
 from gateway.settings import Options, Site
@@ -48,6 +49,9 @@ class Setup:
     live: bool = False
     remembered: Remembered | None = None  # what was known of the radars' errors when the session began
     takes_up: bool = False  # what the last live session of this site, in the archive, has learnt of its radars
+    flows: tuple[ArrivalFlow, ...] | None = (
+        None  # ways that arrivals come; None: those that lie in the archive, if live
+    )
     is_watched: bool = True  # False: drawn in large batches, for a replay as fast as it goes that nobody looks at
     smooth: bool = False  # make smoothed tracks when it is over
     name: str = ""  # of the session's folder, after when it began; without one the site's

@@ -105,7 +105,8 @@ def test_recorded_adsb_becomes_flows_tables_and_a_drawing(tmp_path: Path, capsys
     assert np.abs(np.array(told["airport_deg"]) - [49.0, 2.5]).max() < 0.02
     members = pq.read_table(tmp_path / "out" / "memberships.parquet")
     assert members["flow"].to_pylist().count(1) == 6
-    assert {one.name for one in (tmp_path / "out").iterdir()} == {"memberships.parquet", "flows.parquet", "flows.rrd"}
+    made = {"memberships.parquet", "flows.parquet", "flows.json", "flows.rrd"}
+    assert {one.name for one in (tmp_path / "out").iterdir()} == made
 
 
 def test_a_table_that_lacks_a_column_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
