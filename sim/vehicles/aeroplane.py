@@ -20,6 +20,8 @@ from sim.vehicles.motion import Vector
 GRAVITY_MPS2 = 9.80665
 _ROLL_S, _ROLL_RATE_S, _PATH_S, _PITCH_S, _THRUST_S, _FOLLOWS_S, _ALIGNS_S = 0.5, 0.15, 0.6, 0.4, 0.5, 1.5, 1.0
 _PULL, _PUSH = 0.6, 0.5  # g more and less than level flight
+_LIFT = 1.2  # the most that the wings carry at the slowest speed, over weight
+_NO_DRAUGHT_M = 30.0
 _ATTACK_RAD = math.radians(4.0)  # angle of attack at cruise
 _ROLLING, _BRAKING = 0.03, 0.2  # of the weight
 _SLOWEST_MPS = 5.0  # below this nothing flies, and formulas must still hold
@@ -89,10 +91,11 @@ class Aeroplane:
         """One step further."""
         follows = step_s / _FOLLOWS_S
         north, east, down = self._air_mps
+        near = min((self.body.height_m - self.ground_m) / _NO_DRAUGHT_M, 1.0)  # air does not blow through the ground
         self._air_mps = (
             north + (wind_mps[0] - north) * follows,
             east + (wind_mps[1] - east) * follows,
-            down + (wind_mps[2] - down) * follows,
+            down + (wind_mps[2] * near - down) * follows,
         )
         self.throttle += (controls.throttle - self.throttle) * step_s / _THRUST_S
         self._slip_rad -= self._slip_rad * step_s / _ALIGNS_S
@@ -108,7 +111,8 @@ class Aeroplane:
         roll += self._roll_radps * step_s
         speed = max(self.airspeed_mps, _SLOWEST_MPS)
         pull = (controls.climb_rad - self.climb_rad) / _PATH_S * speed / GRAVITY_MPS2
-        pull = min(max(pull, -_PUSH), _PULL)
+        stalls_at = (speed / p.slowest_mps) ** 2 * _LIFT * math.cos(roll) - math.cos(self.climb_rad)
+        pull = max(min(pull, _PULL, stalls_at), -_PUSH)
         self.climb_rad += pull * GRAVITY_MPS2 / speed * step_s
         load = (math.cos(self.climb_rad) + pull) / math.cos(roll)
         excess = p.thrust * self.throttle - self.drag(speed, load) - math.sin(self.climb_rad)

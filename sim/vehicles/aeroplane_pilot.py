@@ -25,7 +25,8 @@ _FLARE_S = 4.0  # the flare begins where the glide path is so many seconds of si
 _TOUCH_MPS = 0.4
 _STANDS_S = 2.0  # before it disarms
 _STEERS_RADPS = 0.3  # on wheels
-_GO_AROUND_M = 30.0
+_DECISION_M, _CLIMBS_OUT_M = 30.0, 60.0
+_FLARE_BANK_RAD = math.radians(10.0)
 _MODES = {"MANUAL": 0, "AUTO": 10, "RTL": 11, "LOITER": 12, "TAKEOFF": 13, "GUIDED": 15}
 
 
@@ -35,10 +36,11 @@ class AeroplanePilot(Pilot[Controls]):
 
     aeroplane: Aeroplane = field(kw_only=True)
     goes_around: int = field(default=0, kw_only=True)
-    decision_m: float = field(default=_GO_AROUND_M, kw_only=True)
+    decision_m: float = field(default=_DECISION_M, kw_only=True)
     mode: str = "MANUAL"
     _leg: Leg | None = None
     _climbs_to_m: float | None = None  # going around
+    _flares: bool = False
     _centre: Spot | None = None  # of the circle in GUIDED and LOITER
     _radius_m: float = 0.0
     _bearing_rad: float | None = None  # from a circle's centre, at the decision before
@@ -128,7 +130,7 @@ class AeroplanePilot(Pilot[Controls]):
         if self._leg is not None and not self.is_landed and distance_m(self._leg.end, here) < self._near_m:
             north, east, _ = self._leg.end
             start = Spot(north, east, here.height_m)
-        self._leg, self._bearing_rad = Leg(start, end), None
+        self._leg, self._bearing_rad, self._flares = Leg(start, end), None, False
         if item.command == LAND:
             self.aeroplane.ground_m = end.height_m
 
@@ -222,14 +224,14 @@ class AeroplanePilot(Pilot[Controls]):
         above, speed = self.here.height_m - leg.end.height_m, self._ground_speed()
         if self.goes_around > 0 and above <= self.decision_m:
             self.goes_around -= 1
-            self._go_around(item, None)
-            return self._climb_out(leg.end.height_m + self.decision_m)
+            return self._climb_out(self._go_around(item, None))
         height, climb = _height_on(leg, on, speed)
-        sinks = max(-climb, 0.5)
-        if above < _FLARE_S * sinks / 2.0:
-            wanted = -max(above / _FLARE_S * 2.0, _TOUCH_MPS)
-            bank = 0.5 * self._bank(pull)
-            return Controls(bank, math.asin(max(wanted / self.aeroplane.airspeed_mps, -0.3)), 0.0, self._steer(pull))
+        self._flares |= above < 0.5 * _FLARE_S * -climb or on.along_m > leg.length_m
+        if self._flares:
+            wanted = -max(2.0 * above / _FLARE_S, _TOUCH_MPS)
+            wanted += 0.5 * (wanted + self.body.velocity_mps[2])
+            bank = min(max(self._bank(pull), -_FLARE_BANK_RAD), _FLARE_BANK_RAD)
+            return Controls(bank, math.asin(max(wanted / self.aeroplane.airspeed_mps, -0.3)))
         return self._hold_energy(height, climb, self.aeroplane.parameters.approach_mps, self._bank(pull))
 
     def _roll_out(self, pull: float) -> Controls:
@@ -241,10 +243,11 @@ class AeroplanePilot(Pilot[Controls]):
                 self.notes.append("Landed, disarmed")
         return Controls(turn_radps=self._steer(pull), is_braking=True)
 
-    def _go_around(self, item: MissionItem, height_m: float | None) -> None:
-        above = self.decision_m if height_m is None or height_m <= 0.0 else height_m
-        self._climbs_to_m = self.spot(item).height_m + above
+    def _go_around(self, item: MissionItem, height_m: float | None) -> float:
+        """The height to which it climbs."""
+        self._climbs_to_m = self.spot(item).height_m + (height_m if height_m else max(_CLIMBS_OUT_M, self.decision_m))
         self.notes.append("Going around")
+        return self._climbs_to_m
 
     def _climb_out(self, height_m: float) -> Controls:
         """Straight on along the runway's line; then the approach from its beginning again."""
