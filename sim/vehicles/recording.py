@@ -100,9 +100,9 @@ def _parsed(raw: bytes) -> Frame:
 
 def _flown(speakers: Sequence[Speaker], longest_s: float) -> Iterator[tuple[int, Moment, list[bytes]]]:
     """Which vehicle, its moment and what it says, step by step; a vehicle with longer steps is silent between them."""
-    flown_s, rests_since = 0.0, 0.0
-    while flown_s < longest_s and flown_s - rests_since < _AFTERWARDS_S:
-        flown_s += STEP_S
+    rests_since = 0.0
+    for step in range(1, round(longest_s / STEP_S) + 1):
+        flown_s = step * STEP_S
         for which, speaker in enumerate(speakers):
             vehicle = speaker.vehicle
             if vehicle.moment.time_s + vehicle.step_s <= flown_s + 1e-6:
@@ -110,6 +110,8 @@ def _flown(speakers: Sequence[Speaker], longest_s: float) -> Iterator[tuple[int,
                 yield which, moment, speaker.say(round(flown_s * 1e9))
         if any(not is_at_rest(speaker) for speaker in speakers):
             rests_since = flown_s
+        elif flown_s - rests_since >= _AFTERWARDS_S:
+            return
 
 
 def is_at_rest(speaker: Speaker) -> bool:

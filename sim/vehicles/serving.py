@@ -66,16 +66,17 @@ def serve(
 ) -> None:
     """Fly the vehicles and talk on the links until asked to stop. `tell` is given what people should know, once."""
     voices = [(one, _voices(one, links)) for one in vehicles]
-    began, flown_s, is_slow = time.monotonic(), 0.0, False
+    began, steps, is_slow = time.monotonic(), 0, False
     while not asked_to_stop():
         turn = time.monotonic()
         goal_s = (turn - began) * speed
-        while flown_s + STEP_S <= goal_s and time.monotonic() - turn < _LONGEST_WAIT_S:
-            flown_s += STEP_S
+        while (steps + 1) * STEP_S <= goal_s and time.monotonic() - turn < _LONGEST_WAIT_S:
+            steps += 1
             for vehicle, heard in voices:
-                _fly_to(vehicle, heard, flown_s)
-        if goal_s - flown_s > _BEHIND_S * speed:
-            began += (goal_s - flown_s) / speed
+                _fly_to(vehicle, heard, steps * STEP_S)
+        behind_s = goal_s - steps * STEP_S
+        if behind_s > _BEHIND_S * speed:
+            began += behind_s / speed
             if not is_slow:
                 is_slow = True
                 tell(
@@ -86,7 +87,7 @@ def serve(
             for level, text in linked.link.news:
                 tell(f"{level}: {text}")
             linked.link.news.clear()
-        _wait(links, min((flown_s + STEP_S - goal_s) / speed, _LONGEST_WAIT_S))
+        _wait(links, min((STEP_S - behind_s) / speed, _LONGEST_WAIT_S))
 
 
 def _voices(vehicle: Vehicle, links: Sequence[LinkedVehicles]) -> list[tuple[LinkedVehicles, Speaker]]:

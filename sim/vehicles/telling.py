@@ -37,6 +37,8 @@ STREAMS: Mapping[int, tuple[str, ...]] = {  # MAV_DATA_STREAM, as ArduPilot fill
     11: ("VFR_HUD",),
     12: ("SYSTEM_TIME", "WIND"),
 }
+_ORDER = {name: order for order, name in enumerate(SAYS)}
+_ROUNDING_S = 1e-6
 
 
 @dataclass(slots=True)
@@ -55,14 +57,17 @@ class Teller:
                 self.set_interval(name, 1.0 / rate)
 
     def set_interval(self, name: str, every_s: float | None) -> None:
-        """From now on so often; None: not at all. Raises KeyError for what this vehicle does not tell."""
+        """From the next step on so often, once a step at most; None: not at all.
+
+        Raises KeyError for what this vehicle does not tell.
+        """
         SAYS[name]
+        vehicle = self.sayings.vehicle
         self._due = [one for one in self._due if one[2] != name]
         self._every_s.pop(name, None)
         if every_s is not None:
-            self._every_s[name] = every_s
-            order = list(SAYS).index(name)
-            self._due.append((self.sayings.vehicle.moment.time_s, order, name))
+            self._every_s[name] = max(every_s, vehicle.step_s)
+            self._due.append((vehicle.moment.time_s + vehicle.step_s, _ORDER[name], name))
         heapq.heapify(self._due)
 
     def interval_s(self, name: str) -> float | None:
@@ -72,12 +77,12 @@ class Teller:
 
     def due(self) -> Iterator[tuple[str, Values]]:
         """What is to be said at the vehicle's moment."""
-        now = self.sayings.vehicle.moment.time_s + 1e-6
-        while self._due[0][0] <= now:
+        now = self.sayings.vehicle.moment.time_s
+        while self._due and self._due[0][0] <= now + _ROUNDING_S:
             at, order, name = self._due[0]
             every = self._every_s[name]
-            further = at + every if at + every > now else now + every  # nothing is made up for
-            heapq.heapreplace(self._due, (further, order, name))
+            is_late = at + every <= now + _ROUNDING_S  # nothing is made up for
+            heapq.heapreplace(self._due, ((now if is_late else at) + every, order, name))
             if (values := self.sayings.now(name)) is not None:
                 yield name, values
         reached = self.sayings.vehicle.mission.reached
