@@ -40,7 +40,6 @@ class Wanted:
     def opened(self, files: Sequence[Path], plans: Missions = ()) -> tuple[Playback, Setup]:
         """The recording, and how it is run. Raises FileError, FolderError, SeekError, UsageError."""
         from gateway.runtime.playback import open_playback
-        from gateway.runtime.setup import Setup
 
         playback = open_playback(files, plans, self.signing_key)
         options = self.methods.change(playback.options)
@@ -49,11 +48,11 @@ class Wanted:
         playback, options = self.section.cut(playback, options)
         flows = take.read_flows(self.methods.flows)
         has_own_place = self.place is not None or playback.place is not None
-        return playback, Setup(
-            place=self.place or playback.place or playback.find_place(),
+        setup = playback.setup(self.place)
+        return playback, replace(
+            setup,
             options=options,
-            remembered=playback.remembered,
-            flows=playback.flows if flows is None else flows,
+            flows=setup.flows if flows is None else flows,
             keys=self.keys,
             signing_key=self.signing_key,
             smooth=self.smooth,

@@ -24,7 +24,7 @@ from gateway.runtime.inputs import SessionInput
 from gateway.runtime.places import Overview, look_over
 from gateway.runtime.seeking import SECOND, Span
 from gateway.runtime.sessions import mend
-from gateway.runtime.setup import Place
+from gateway.runtime.setup import Place, Setup
 from gateway.runtime.told_plans import Missions, ToldInput, told_plan, told_source, whose
 from gateway.settings import Options, SiteError, parse_site
 
@@ -102,6 +102,15 @@ class Playback:
     def find_place(self) -> Place | None:
         """The place that the recordings tell of when all of them is known, or None."""
         return self.overview().place
+
+    def setup(self, place: Place | None = None) -> Setup:
+        """How it was run, so that it can be run again; at `place`, else its own, else where the recording tells it was."""
+        return Setup(
+            place=place or self.place or self.find_place(),
+            options=self.options,
+            remembered=self.remembered,
+            flows=self.flows,
+        )
 
     def span(self) -> Span:
         """From when to when it goes."""

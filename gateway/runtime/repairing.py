@@ -9,7 +9,7 @@ import json
 import os
 import re
 import shutil
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from gateway.runtime.listing import TABLES, Listed, look
 from gateway.runtime.loop import run_replay
 from gateway.runtime.outputs import RRD_FILE
 from gateway.runtime.playback import open_playback
-from gateway.runtime.setup import RunFailure, Setup
+from gateway.runtime.setup import RunFailure
 from gateway.settings import Options
 
 _KINDS: dict[str, Kind] = {"tlog": "mavlink", "pcap": "radar", "jsonl": "told"}
@@ -61,14 +61,7 @@ def _replay(folder: Path, names: list[str]) -> None:
     shutil.rmtree(beside, ignore_errors=True)
     try:
         playback = open_playback([folder])
-        setup = Setup(
-            place=playback.place or playback.find_place(),
-            options=playback.options,
-            archive=beside,
-            remembered=playback.remembered,
-            is_watched=False,
-            folder_name=folder.name,
-        )
+        setup = replace(playback.setup(), archive=beside, is_watched=False, folder_name=folder.name)
         run_replay(playback, setup)
         for name in names:
             if (beside / folder.name / name).exists():
