@@ -88,7 +88,7 @@ class Sheet:
                 place[axis] = value
                 place[1 - axis] -= 2.5 * self.pixel_m * (_PIXELS / 100.0)
                 places.append(self.at(place))
-                labels.append(f"{value / 1000.0:g}" if value or axis == 0 else "0 km")
+                labels.append(f"{value / 1000.0:g}" if value or axis == 0 else "")
         points = rr.Points2D(places, labels=labels, show_labels=True, colors=[style.TEXT], radii=[0.01])
         recording.log(self.path("scale"), points, static=True)
 

@@ -79,7 +79,9 @@ def _caption(flight: Flight, count: int) -> str:
 
 
 def _blueprint(sheet: Sheet, flight: Flight) -> rrb.Blueprint:
-    tabs: list[rrb.Container | rrb.View] = [views(sheet, "From above; a metre costs from 1 (dark) to 30 and more (red)", "/summary")]
+    tabs: list[rrb.Container | rrb.View] = [
+        views(sheet, "From above; a metre costs from 1 (dark) to 30 and more (red)", "/summary")
+    ]
     if flight.case.is_placed or flight.final is not None:
         tabs.append(rrb.MapView(origin="/map", name="Map"))
     body = tabs[0] if len(tabs) == 1 else rrb.Tabs(*tabs)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from numpy.polynomial import Legendre
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.optimize import minimize
@@ -23,11 +24,13 @@ Floats = NDArray[np.float64]
 DEGREE = 3
 SPAN_M = 900.0  # of way for each control point; threats are 3 km apart
 LEAST_SPANS, MOST_SPANS = 12, 72
-_GAUSS = 5  # quadrature points in each span
+_LOBATTO = 6  # quadrature points in each span
 _UNIT_M = 1_000.0  # what places are scaled with for the search
 _EVEN = 1e-3  # the weight of even spacing, which J leaves open
-_WEIGHTS = (1.0, 10.0, 100.0, 1_000.0, 10_000.0)  # of too narrow turns and areas, one search after another
-_WIDER, _ASIDE_M = 1.01, 10.0  # what is asked for more than the turn radius and the areas' borders
+_SEARCHES = ((1.0, 1.02), (10.0, 1.03), (100.0, 1.06), (1_000.0, 1.1), (10_000.0, 1.2))
+"""One after another until nothing is wrong: the weight of too narrow turns and areas, and how much wider turns are asked for
+than they must be: between the quadrature's points they may be narrower."""
+_ASIDE_M = 10.0  # what is asked for more than the areas' borders
 _DENSE = 12  # points a span at which the result is checked
 _ITERATIONS = 150
 
@@ -59,9 +62,11 @@ def clamped_basis(controls: int) -> Basis:
 
 @cache
 def _quadrature(controls: int) -> Basis:
-    """The same at the points of Gauss's quadrature in each span."""
+    """The same at the points of Lobatto's quadrature in each span, which has the ends, where turns may be narrowest."""
     spans = controls - DEGREE
-    node, share = np.polynomial.legendre.leggauss(_GAUSS)
+    last = Legendre.basis(_LOBATTO - 1)
+    node = np.concatenate([[-1.0], np.sort(last.deriv().roots().real), [1.0]])
+    share = 2.0 / (_LOBATTO * (_LOBATTO - 1) * last(node) ** 2)
     at = ((np.arange(spans)[:, None] + 0.5 * (node + 1.0)) / spans).ravel()
     return _basis(controls, at, np.tile(0.5 * share / spans, spans))
 
@@ -78,14 +83,15 @@ def bend(task: Task, way_m: Floats) -> Bent:
     controls = int(np.clip(round(length / SPAN_M), LEAST_SPANS, MOST_SPANS)) + DEGREE
     search = _Search.of(task, controls)
     free = search.begin(way_m)
-    for weight in _WEIGHTS:
+    wide_turns = max(SPAN_M / max(task.turn_radius_m, 1.0), 1.0)  # a way without kinks to begin with
+    for number, (weight, wider) in enumerate(((1.0, wide_turns), *_SEARCHES)):
         found = minimize(
-            search.cost, free, args=(weight,), jac=True, method="L-BFGS-B", bounds=search.bounds(),
+            search.cost, free, args=(weight, wider), jac=True, method="L-BFGS-B", bounds=search.bounds(),
             options={"maxiter": _ITERATIONS, "maxcor": 20, "ftol": 1e-9, "gtol": 1e-6},
         )  # fmt: skip
         free = found.x
         bent = search.bent(free)
-        if bent.turn_radius_m >= task.turn_radius_m and bent.outside_m >= 0.0:
+        if number and bent.turn_radius_m >= task.turn_radius_m and bent.outside_m >= 0.0:
             break
     return bent
 
@@ -131,8 +137,9 @@ class _Search:
         """The box of each control point, in which its curve stays, and rays that point forward."""
         low, high = self.task.box_m / _UNIT_M
         planar = (len(self.fixed) - 2 - self.on_rays) * [(low[0], high[0]), (low[1], high[1])]
-        least = 0.1 * SPAN_M / _UNIT_M
-        return [*planar, *(self.on_rays * [(least, 10.0 * least)])]
+        straight = float(np.linalg.norm(self.fixed[-1] - self.fixed[0]))
+        even = max(straight, SPAN_M / _UNIT_M) / (len(self.fixed) - DEGREE) / DEGREE  # of a straight way of even speed
+        return [*planar, *(self.on_rays * [(0.5 * even, 6.0 * even)])]
 
     def controls(self, free: Floats) -> Floats:
         """The control points (n, 2), km."""
@@ -150,22 +157,22 @@ class _Search:
         radius = _UNIT_M / max(float(bend_.max()), 1e-9)
         return Bent(place, radius, float(outside(self.task.areas, place).min()))
 
-    def cost(self, free: Floats, weight: float) -> tuple[float, Floats]:
+    def cost(self, free: Floats, weight: float, wider: float = 1.0) -> tuple[float, Floats]:
         """J in km, with what too narrow turns and areas cost, and its derivative by what is free."""
         controls = self.controls(free)
         basis = _quadrature(len(controls))
         place, first, second = basis.value @ controls, basis.first @ controls, basis.second @ controls
         speed = np.maximum(np.hypot(first[:, 0], first[:, 1]), 1e-6)
         rate, by_place = self._rate(place, weight)
-        narrow, by_first, by_second = self._narrow(first, second, speed, weight)
-        rate = rate + narrow
+        narrow, by_first, by_second = self._narrow(first, second, speed, wider)
+        rate = rate + weight * narrow
         length = float(np.linalg.norm(self.fixed[-1] - self.fixed[0]))
         share = basis.weight
         total = float((share * (rate * speed + _EVEN / length * speed**2)).sum())
         along = (share * (rate / speed + 2.0 * _EVEN / length))[:, None] * first
         by_controls = basis.value.T @ ((share * speed)[:, None] * by_place)
-        by_controls += basis.first.T @ (along + (share * speed)[:, None] * by_first)
-        by_controls += basis.second.T @ ((share * speed)[:, None] * by_second)
+        by_controls += basis.first.T @ (along + (weight * share * speed)[:, None] * by_first)
+        by_controls += basis.second.T @ ((weight * share * speed)[:, None] * by_second)
         return total, np.einsum("nak,na->k", self.moves, by_controls)
 
     def _rate(self, place: Floats, weight: float) -> tuple[Floats, Floats]:
@@ -180,16 +187,16 @@ class _Search:
             by_place = by_place - 20.0 * weight * inside[:, None] * outward
         return rate, by_place
 
-    def _narrow(self, first: Floats, second: Floats, speed: Floats, weight: float) -> tuple[Floats, Floats, Floats]:
+    def _narrow(self, first: Floats, second: Floats, speed: Floats, wider: float) -> tuple[Floats, Floats, Floats]:
         """What turns narrower than allowed cost a km (m,), and its derivatives by the curve's two (m, 2)."""
-        radius = self.task.turn_radius_m * _WIDER / _UNIT_M
+        radius = self.task.turn_radius_m * wider / _UNIT_M
         cross = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
         bent = radius * cross / speed**3
         over = np.maximum(np.abs(bent) - 1.0, 0.0)
-        slope = weight * 2.0 * over * np.sign(bent) * radius / speed**3
+        slope = 2.0 * over * np.sign(bent) * radius / speed**3
         across = np.stack([second[:, 1], -second[:, 0]], axis=-1) - (3.0 * cross / speed**2)[:, None] * first
         return (
-            weight * over**2,
+            over**2,
             slope[:, None] * across,
             slope[:, None] * np.stack([-first[:, 1], first[:, 0]], axis=-1),
         )
