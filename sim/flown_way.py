@@ -1,6 +1,6 @@
 """A vehicle that flies its mission by itself, in wind, recorded as a way: the truth that a scene's sensors measure.
 
-It is stepped through its whole mission when it is first asked where it is; the same seed gives the same bits.
+It is stepped as far as it is asked for; the same seed gives the same bits, however it is asked.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import uniform_filter1d
 
 from adapters.mission_writing import MissionItem
 from sim.earth import Flown
@@ -48,8 +47,13 @@ class FlownWay:
 
     @property
     def end_s(self) -> float:
-        """When it is gone."""
-        return self.start_s + float(self._record[-1, 0])
+        """When it is gone. The whole mission is flown to know it."""
+        return self.end_before(math.inf)
+
+    def end_before(self, time_s: float) -> float:
+        """When it is gone, or a time before that; it is flown no further."""
+        record = self._flight.until(time_s - self.start_s)
+        return min(self.start_s + float(record[-1, 0]), time_s)
 
     def starting(self, later_s: float) -> FlownWay:
         """The same, later."""
@@ -58,12 +62,14 @@ class FlownWay:
     def flown(self, time_s: ArrayLike) -> Flown:
         """The truth at times (...), seconds of the scene."""
         since = np.asarray(time_s, dtype=np.float64) - self.start_s
-        record = self._record
-        latitude, longitude, height, north, east, down, roll, pitch, yaw, turn, airspeed = (
-            np.interp(since, record[:, 0], column) for column in record[:, 1:12].T
-        )
+        record = self._flight.until(float(np.max(since, initial=0.0)) + 0.5 * _SMOOTH_S)
+        times = record[:, 0]
+        columns = (np.interp(since, times, column) for column in record[:, 1:11].T)
+        latitude, longitude, height, north, east, down, roll, pitch, yaw, airspeed = columns
         velocity = np.stack([east, north, -down], axis=-1)
-        return Flown(latitude, longitude, height, velocity, roll, pitch, yaw % (2.0 * math.pi), turn, airspeed)
+        return Flown(
+            latitude, longitude, height, velocity, roll, pitch, yaw % (2.0 * math.pi), _turn(record, since), airspeed
+        )
 
     @property
     def mission(self) -> tuple[MissionItem, ...]:
@@ -72,24 +78,14 @@ class FlownWay:
 
     def items_flown(self, time_s: ArrayLike) -> NDArray[np.int64]:
         """Which item it flies to at times (...), seconds of the scene."""
-        steps = np.searchsorted(self._record[:, 0], np.asarray(time_s) - self.start_s, side="right") - 1
-        return np.asarray(self._record[np.maximum(steps, 0), 12], dtype=np.int64)
+        since = np.asarray(time_s, dtype=np.float64) - self.start_s
+        record = self._flight.until(float(np.max(since, initial=0.0)))
+        steps = np.searchsorted(record[:, 0], since, side="right") - 1
+        return np.asarray(record[np.maximum(steps, 0), 11], dtype=np.int64)
 
     @cached_property
-    def _record(self) -> Floats:
-        """Every step (n, 13): time, place, velocity, attitude with a yaw that goes on beyond a circle, turn, airspeed, item."""
-        vehicle = self._vehicle()
-        rows, done_s = [_row(vehicle)], math.inf
-        while (now_s := vehicle.moment.time_s) < min(done_s + STANDS_S, LONGEST_S):
-            vehicle.step()
-            rows.append(_row(vehicle))
-            if math.isinf(done_s) and vehicle.mission.is_complete:
-                done_s = now_s
-        record = np.array(rows)
-        record[:, 0] -= record[0, 0]
-        record[:, 9] = np.unwrap(record[:, 9])
-        record[:, 10] = _turn(record, vehicle.step_s)
-        return record
+    def _flight(self) -> _Flight:
+        return _Flight(self._vehicle())
 
     def _vehicle(self) -> Vehicle:
         """It stands at home and is told to go; a ship is at sea, under way."""
@@ -115,16 +111,41 @@ class FlownWay:
         return aeroplane(home, items, parameters=like, wind=self.wind, seed=seed, system=system, goes_around=rounds)
 
 
+class _Flight:
+    """A vehicle that is stepped as far as somebody asks, and what it has come through."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self._vehicle, self._rows = vehicle, [_row(vehicle)]
+        self._record, self._done_s = np.array(self._rows), math.inf
+
+    def until(self, since_s: float) -> Floats:
+        """Every step (n, 12) until this time at least, or to the end: time, place, velocity, attitude, airspeed, item.
+
+        The yaw goes on beyond a circle.
+        """
+        vehicle = self._vehicle
+        while (now_s := vehicle.moment.time_s) < min(since_s, self._done_s + STANDS_S, LONGEST_S):
+            vehicle.step()
+            self._rows.append(_row(vehicle))
+            if math.isinf(self._done_s) and vehicle.mission.is_complete:
+                self._done_s = now_s
+        if len(self._rows) > len(self._record):
+            self._record = np.array(self._rows)
+            self._record[:, 9] = np.unwrap(self._record[:, 9])
+        return self._record
+
+
 def _row(vehicle: Vehicle) -> tuple[float, ...]:
     moment = vehicle.moment
     speed = math.dist(moment.velocity_mps, (0.0, 0.0, 0.0)) if moment.airspeed_mps is None else moment.airspeed_mps
     place = (moment.latitude_rad, moment.longitude_rad, moment.height_m)
-    return (moment.time_s, *place, *moment.velocity_mps, *moment.attitude_rad, 0.0, speed, vehicle.mission.current)
+    return (moment.time_s, *place, *moment.velocity_mps, *moment.attitude_rad, speed, vehicle.mission.current)
 
 
-def _turn(record: Floats, step_s: float) -> Floats:
-    """How fast the course turns to the right (n,), rad/s; 0 for what stands."""
-    north, east = record[:, 4], record[:, 5]
+def _turn(record: Floats, since_s: Floats) -> Floats:
+    """How fast the course turns to the right (...), rad/s, over a second so that gusts are none; 0 for what stands."""
+    times, north, east = record[:, 0], record[:, 4], record[:, 5]
     course = np.unwrap(np.arctan2(east, north))
-    rate = uniform_filter1d(np.gradient(course, step_s), size=round(_SMOOTH_S / step_s) | 1, mode="nearest")
-    return np.where(np.hypot(north, east) > _STANDS_MPS, rate, 0.0)
+    after, before = (np.interp(since_s + half, times, course) for half in (0.5 * _SMOOTH_S, -0.5 * _SMOOTH_S))
+    moves = np.interp(since_s, times, np.hypot(north, east)) > _STANDS_MPS
+    return np.where(moves, (after - before) / _SMOOTH_S, 0.0)

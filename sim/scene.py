@@ -98,8 +98,10 @@ class Scene:
 
     def present(self, aircraft: Aircraft) -> tuple[float, float]:
         """From when until before when an aircraft is in the scene, s; the same twice if never."""
-        start = max(aircraft.path.start_s, 0.0)
-        return start, max(min(aircraft.path.end_s, self.duration_s), start)
+        way = aircraft.path
+        start = max(way.start_s, 0.0)
+        end = way.end_before(self.duration_s) if isinstance(way, FlownWay) else min(way.end_s, self.duration_s)
+        return start, max(end, start)
 
     def flown(self, aircraft: Aircraft, time_s: ArrayLike) -> Flown:
         """The truth about an aircraft at times (...), which must be within its presence."""

@@ -51,7 +51,7 @@ def _names(sent: list[Sent]) -> Counter[str]:
     return Counter(message_name(frame.message) for frame in frames if frame is not None)
 
 
-@pytest.mark.parametrize("name", ["approach", "landing", "traffic", "conflicts"])
+@pytest.mark.parametrize("name", ["approach", "traffic", "links"])
 def test_events_arrive_in_order(name: str) -> None:
     """Stamps are strictly increasing multiples of 4 us over all links, within the scene's duration."""
     scene = _scene(name, "radars=2")
@@ -64,7 +64,7 @@ def test_events_arrive_in_order(name: str) -> None:
 
 def test_a_seed_decides_every_byte() -> None:
     """The same scene gives the same bytes; another seed gives others of the same kinds."""
-    first, again, other = (list(events(_scene("traffic", seed=seed))) for seed in (1, 1, 2))
+    first, again, other = (list(events(_scene("traffic", "duration_s=8", seed=seed))) for seed in (1, 1, 2))
     assert first == again
     assert first != other
     assert set(_names(first)) == set(_names(other))

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -46,8 +47,9 @@ def test_each_scene_that_comes_along_says_what_it_is_and_plays(name: str) -> Non
     assert script.description.endswith(".")
     whole = stage(script, start_ns=0)
     assert whole.aircraft
-    since = min(one.path.start_s for one in whole.aircraft)
-    heard = {one.link for one in events(stage(script, start_ns=0, changes=[f"duration_s={max(since, 0.0) + 5.0}"]))}
+    since = max(min(one.path.start_s for one in whole.aircraft), 0.0)
+    part = stage(script, start_ns=0, changes=[f"duration_s={since + 5.0}"])
+    heard = {one.link for one in events(replace(part, aircraft=part.aircraft[:8]))}
     assert any(link.startswith("mavlink") for link in heard)
     assert all(radar.name in heard for radar in whole.radars)
 
