@@ -157,6 +157,11 @@ def simulate(
         show_scene(scene)
         return
     pace = read_speed(speed, 1.0)
+    if scene == "helmsman":
+        from gateway.cli.helmsman import steer_a_ship
+
+        steer_a_ship(mavlink, settings or [], quiet)
+        return
     if scene == "vehicle":
         wanted = Wanted(kind, mission, home, count, wind, start, seconds, seed or 0)
         simulate_vehicles(wanted, site, mavlink, speed=pace, archive=archive, quiet=quiet)

@@ -177,9 +177,11 @@ def _start(fleet: dict[int, Vehicle]) -> None:
 
 
 def _speakers(fleet: dict[int, Vehicle], wanted: Wanted, start_ns: int) -> list[Speaker]:
+    from sim.ships.linked import ShipSpeaker
     from sim.vehicles.speaking import Speaker, sensors_of
 
-    return [Speaker.of(number, one, sensors_of(wanted.seed, number), start_ns) for number, one in fleet.items()]
+    speaks = ShipSpeaker if wanted.kind is VehicleType.ship else Speaker
+    return [speaks.of(number, one, sensors_of(wanted.seed, number), start_ns) for number, one in fleet.items()]
 
 
 def _write(

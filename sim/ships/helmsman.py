@@ -71,6 +71,7 @@ class Helmsman:
     _memory: Memory | None = None
     _along: Along = field(default_factory=lambda: Along.start(()))
     _order: Floats = field(default_factory=lambda: np.zeros(()))
+    _is_there: bool = False
     _arrived: bool = False
 
     def hear(self, frame: Frame, now_ns: int) -> list[Ask]:
@@ -172,7 +173,8 @@ class Helmsman:
         end = route.points_m[-1]
         is_last = int(self._along.leg) == len(route.points_m) - 2
         near = math.hypot(float(end[0] - east), float(end[1] - north)) < route.reach_m
-        if is_last and (near or bool(is_arrived(route, self._along.leg, east, north))):
+        was_there, self._is_there = self._is_there, near or bool(is_arrived(route, self._along.leg, east, north))
+        if is_last and was_there and self._is_there:  # a step later: by then she has counted it herself
             self._arrived = True
             self.notes.append("Arrived.")
             return [self._control(0.0, 0), self._command(_SET_MODE, _CUSTOM_MODE, HOLD)]

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from gateway.frames import RunwayFrame, level_axes
 from gateway.observation import Attitude, GpsReport, Observation
 from gateway.predict.approach import Deviations, deviations
-from gateway.settings import DEMO_SITE, Site, SiteError, format_site, parse_site
+from gateway.settings import DEMO_SITE, Options, Site, SiteError, format_site, parse_site
 from gateway.sinks.scene.deck import DeckScene
 from gateway.sinks.scene.flown import Flights
 
 Floats = NDArray[np.float64]
+LIGHT = Options(estimator="kalman")  # the deck is the same with any
 Run = Any  # tests.gateway.conftest's
 
 SHIP, PLANE = "mavlink:7", "mavlink:1"
@@ -113,7 +114,7 @@ def _off(pictures: Any, site: Site = SITE) -> tuple[Floats, Deviations]:
 @pytest.fixture(scope="module")
 def straight(world: Any) -> Run:
     """A ship that sails straight on, and the aircraft that lands on her."""
-    run: Run = world.with_site(SITE).run(_aboard(world))
+    run: Run = world.with_site(SITE).run(_aboard(world), options=LIGHT)
     return run
 
 
@@ -122,7 +123,7 @@ def test_who_flies_down_the_moving_glide_path_is_on_it(
     world: Any, straight: Run, turn_degps: float, within_m: float
 ) -> None:
     """Once the heading is known: less than half a metre off, straight on; in a turn what the filter of a track lags."""
-    run = world.with_site(SITE).run(_aboard(world, turn_degps)) if turn_degps else straight
+    run = world.with_site(SITE).run(_aboard(world, turn_degps), options=LIGHT) if turn_degps else straight
     time, off = _off(run.pictures)
     late = time > world.at(18.0)
     assert np.abs(off.vertical_m[late]).max() < within_m
@@ -140,14 +141,14 @@ def test_without_following_the_same_aircraft_is_far_off(straight: Run) -> None:
 
 def test_waves_hardly_move_the_deck(world: Any) -> None:
     """Two degrees of yawing, which would be 140 m at 4 km, leave a tenth of that."""
-    time, off = _off(world.with_site(SITE).run(_aboard(world, yaws_deg=2.0)).pictures)
+    time, off = _off(world.with_site(SITE).run(_aboard(world, yaws_deg=2.0), options=LIGHT).pictures)
     assert np.nanmax(np.abs(off.lateral_rad[time > world.at(32.0)])) < math.radians(2.0) / 10.0
 
 
 def test_ticks_do_not_move_the_deck(world: Any) -> None:
     """One arrival at a time, in ticks of 20 ms and all at once: the same rows, poses and sentences, bit for bit."""
     told, here = _aboard(world, 0.3, silent_from_s=10.0, yaws_deg=2.0)[:130], world.with_site(SITE)
-    runs = [here.run(told, ticks=ticks, until_s=44.0) for ticks in ("one", "20 ms", "all")]
+    runs = [here.run(told, ticks=ticks, until_s=44.0, options=LIGHT) for ticks in ("one", "20 ms", "all")]
     poses = [
         [(pose.at, pose.enu_m.tobytes(), pose.deck_from_enu.tobytes()) for one in run.pictures for pose in one.deck]
         for run in runs
@@ -160,7 +161,7 @@ def test_ticks_do_not_move_the_deck(world: Any) -> None:
 
 def test_a_ship_that_is_lost_is_carried_on_and_that_is_said(world: Any) -> None:
     """Silent from 30 s on, straight: the aircraft is still less than three metres off 25 s later; both are said once."""
-    run = world.with_site(SITE).run(_aboard(world, silent_from_s=30.0), until_s=90.0)
+    run = world.with_site(SITE).run(_aboard(world, silent_from_s=30.0), until_s=90.0, options=LIGHT)
     time, off = _off(run.pictures)
     late = (time > world.at(18.0)) & (time < world.at(58.0))
     assert np.abs(off.lateral_m[late]).max() < 3.0
