@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gateway.cli import options as take
+from gateway.cli.arrivals_selected import Selection, document, flown_by, shortcuts, table_of
 from gateway.cli.failures import RunError, UsageError
 from gateway.cli.many import Crew, expanded, failures, tell_failures
 from gateway.cli.places import read_place_deg
@@ -17,6 +18,7 @@ from gateway.cli.spread import spread
 
 if TYPE_CHECKING:
     from gateway.offline.flows import Flows, Track
+    from gateway.offline.procedures import Compared
     from gateway.runtime.arrivals import Flight
 
 _HELP = """
@@ -26,11 +28,17 @@ Recorded ADS-B is read as CSV (also .gz) or Parquet with the columns timestamp, 
 flight_id, callsign or icao24; and so are archived sessions, and folders of them. Flights that do not end low are left out
 (paper 002-7).
 
+With --procedure arrivals are compared with what is published: who flew which procedure, shortcuts, heights at the entry.
+
 Examples:
 
   talkdown flows arrivals.csv.gz --airport 49.01,2.55
 
   talkdown flows sessions --method jaccard --archive flows
+
+  talkdown flows arrivals.csv.gz --runway 27 --from NE
+
+  talkdown flows sessions --runway 26L --procedure published.toml --archive flows
 """
 
 
@@ -68,6 +76,7 @@ def flows(
     least: Annotated[
         int, typer.Option("--least", metavar="N", min=2, help="How many flights make a flow; fewer came alone.")
     ] = 3,
+    selection: Selection = Selection(),
     archive: take.ArchiveOption = None,
     crew: Crew = Crew(),
     telling: take.Telling = take.Telling(),
@@ -80,6 +89,7 @@ def flows(
     if chosen is None:
         raise UsageError(f"--method {method!r} is none of {', '.join(METHODS)}.")
     where = None if airport is None else read_place_deg(airport, "--airport")
+    published = selection.published()
     paths = expanded(files, crew)
     flights, failed = _read(paths, crew, show=not telling.quiet)
     try:
@@ -87,6 +97,8 @@ def flows(
     except ArrivalsError as error:
         tell_failures(failed, len(paths))
         raise UsageError(str(error)) from error
+    tracks = selection.of(tracks, published, where)
+    beside = selection.compared(tracks, published, where)
     try:
         result = found(tracks, chosen, least_flights=least)
     except ModuleNotFoundError as error:
@@ -94,11 +106,14 @@ def flows(
             "--method default needs scikit-learn, which is not installed: pip install 'talkdown[flows]', or --method jaccard."
         ) from error
     if archive is not None:
-        _archive(archive, tracks, result, where)
+        _archive(archive, tracks, result, where, beside)
     if telling.json:
-        print(text.dumps(_document(tracks, result, where, left_out) | {"failed": failed}))
+        told = {} if beside is None else {"procedures": document(beside, tracks)}
+        print(text.dumps(_document(tracks, result, where, left_out, beside) | told | {"failed": failed}))
     elif not telling.quiet:
-        _show(tracks, result, where, left_out)
+        _show(tracks, result, where, left_out, beside)
+        if beside is not None:
+            _show_procedures(beside, tracks)
         if archive is not None:
             print(f"archived in {archive}; look: rerun {archive / 'flows.rrd'}")
     tell_failures(failed, len(paths))
@@ -125,7 +140,9 @@ def flights_one(path: Path) -> list[Flight]:
         raise RunError(f"{path} could not be read: {(error.strerror or str(error)).lower()}.") from error
 
 
-def _archive(folder: Path, tracks: tuple[Track, ...], result: Flows, airport_deg: tuple[float, float]) -> None:
+def _archive(
+    folder: Path, tracks: tuple[Track, ...], result: Flows, airport_deg: tuple[float, float], beside: Compared | None
+) -> None:
     """memberships.parquet, flows.parquet (mean tracks), flows.json (as predictions take them up), flows.rrd."""
     from gateway.runtime.flow_tables import ways_of, write_flows
     from gateway.runtime.flow_ways import write_ways
@@ -135,12 +152,14 @@ def _archive(folder: Path, tracks: tuple[Track, ...], result: Flows, airport_deg
         folder.mkdir(parents=True, exist_ok=True)
         write_flows(tracks, result, folder)
         write_ways(ways_of(result.flows, airport_deg), airport_deg, folder)
-        draw(tracks, result, folder / "flows.rrd")
+        draw(tracks, result, folder / "flows.rrd", () if beside is None else beside.procedures)
     except OSError as error:
         raise RunError(f"{folder} could not be written: {(error.strerror or str(error)).lower()}.") from error
 
 
-def _document(tracks: tuple[Track, ...], result: Flows, where: tuple[float, float], left_out: int) -> dict[str, Any]:
+def _document(
+    tracks: tuple[Track, ...], result: Flows, where: tuple[float, float], left_out: int, beside: Compared | None
+) -> dict[str, Any]:
     return {
         "airport_deg": list(where),
         "flights": len(tracks),
@@ -152,6 +171,7 @@ def _document(tracks: tuple[Track, ...], result: Flows, where: tuple[float, floa
                 "time_spread_s": flow.time_spread_s,
                 "lateral_spread_m": float(flow.spread_m[:, 0].mean()),
                 "vertical_spread_m": float(flow.spread_m[:, 1].mean()),
+                **({} if beside is None else flown_by(beside, flow.flights)),
             }
             for flow in result.flows
         ],
@@ -163,13 +183,16 @@ def _document(tracks: tuple[Track, ...], result: Flows, where: tuple[float, floa
     }
 
 
-def _show(tracks: tuple[Track, ...], result: Flows, where: tuple[float, float], left_out: int) -> None:
+def _show(
+    tracks: tuple[Track, ...], result: Flows, where: tuple[float, float], left_out: int, beside: Compared | None
+) -> None:
     from rich.console import Console
     from rich.table import Table
 
     console = Console(highlight=False)
     table = Table(box=None, padding=(0, 2, 0, 0))
-    for place, heading in enumerate(("flow", "flights", "from", "minutes", "+-", "lateral, m", "vertical, m")):
+    headings = ("flow", "flights", "from", "minutes", "+-", "lateral, m", "vertical, m")
+    for place, heading in enumerate((*headings, *(() if beside is None else ("procedure", "of them", "aside, m")))):
         table.add_column(heading, justify="right" if place else "left", no_wrap=True)
     for number, flow in enumerate(result.flows, 1):
         east, north = flow.mean_m[0, :2]
@@ -182,6 +205,7 @@ def _show(tracks: tuple[Track, ...], result: Flows, where: tuple[float, float], 
             f"{bearing:03.0f} deg, {distance:.0f} km",
             *(f"{one:.1f}" for one in numbers),
             *(f"{one:.0f}" for one in spreads),
+            *(() if beside is None else _procedure(flown_by(beside, flow.flights))),
         )
     console.print(table)
     alone = [
@@ -193,3 +217,22 @@ def _show(tracks: tuple[Track, ...], result: Flows, where: tuple[float, float], 
         console.print(f"alone: {', '.join(alone)}")
     more = f"; {left_out} more did not end low" if left_out else ""
     console.print(f"{len(tracks)} arrivals about {where[0]:.4f}, {where[1]:.4f}{more}")
+
+
+def _procedure(flown: dict[str, Any]) -> tuple[str, str, str]:
+    """What most of a flow's flights flew, in words."""
+    if flown["procedure"] is None:
+        return "none", "", ""
+    return flown["procedure"], f"{100.0 * flown['procedure_share']:.0f} %", f"{flown['procedure_aside_m'] or 0.0:.0f}"
+
+
+def _show_procedures(beside: Compared, tracks: tuple[Track, ...]) -> None:
+    """Heights are above the airport."""
+    from rich.console import Console
+
+    console = Console(highlight=False)
+    console.print(table_of(beside, tracks))
+    for line in shortcuts(beside, tracks):
+        console.print(line)
+    none = [track.name for track, one in zip(tracks, beside.flights, strict=True) if one is None]
+    console.print(f"on no procedure: {len(none)} of {len(tracks)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from gateway.offline.flows import OUTLIER, Flows, Track, distance_to_go
+from gateway.offline.procedures import Procedure
 from gateway.sinks.scene import style
 from gateway.sinks.scene.entry import entity
 
@@ -21,10 +23,11 @@ COLOURS: tuple[style.Colour, ...] = (
 )
 HEIGHTENED = 5.0
 _ALONE: style.Colour = (110, 110, 110)
+_PUBLISHED: style.Colour = (245, 245, 245)
 
 
-def draw(tracks: tuple[Track, ...], flows: Flows, path: Path) -> None:
-    """Write them into an .rrd. Raises OSError."""
+def draw(tracks: tuple[Track, ...], flows: Flows, path: Path, procedures: Sequence[Procedure] = ()) -> None:
+    """Write them into an .rrd, with the published procedures that they are compared with. Raises OSError."""
     with rr.RecordingStream("talkdown_flows", recording_id=path.stem) as recording:
         recording.save(str(path), default_blueprint=_blueprint())
         recording.send_recording_name("arrival flows")
@@ -53,6 +56,23 @@ def draw(tracks: tuple[Track, ...], flows: Flows, path: Path) -> None:
                 _plan_km(flow.mean_m[:1]), labels=[label], show_labels=True, colors=[colour], radii=style.points(5.0)
             )
             recording.log(entity("plan", name, "begin"), begin, static=True)
+        for procedure in procedures:
+            _draw_procedure(recording, procedure)
+
+
+def _draw_procedure(recording: rr.RecordingStream, procedure: Procedure) -> None:
+    """Its line and its points, on the ground in space: heights are bounds, not a way."""
+    at = "published", procedure.name
+    level = np.concatenate([procedure.place_m, np.zeros((len(procedure.points), 1))], axis=1)
+    line = rr.LineStrips3D([level], colors=[_PUBLISHED], radii=style.points(1.2))
+    recording.log(entity("flights", *at), line, static=True)
+    seen = _plan_km(procedure.place_m)
+    flat = rr.LineStrips2D([seen], colors=[_PUBLISHED], radii=style.points(1.2))
+    recording.log(entity("plan", *at), flat, static=True)
+    named = rr.Points2D(
+        seen, labels=list(procedure.points), show_labels=True, colors=[_PUBLISHED], radii=style.points(3.5)
+    )
+    recording.log(entity("plan", *at, "points"), named, static=True)
 
 
 def _plan_km(place_m: Floats) -> Floats:
