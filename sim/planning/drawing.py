@@ -155,6 +155,9 @@ def views(sheet: Sheet, name: str, caption: str | None = None) -> rrb.Horizontal
     plan = rrb.Spatial2DView(
         origin=f"/{sheet.root}",
         name=name,
+        visual_bounds=rrb.VisualBounds2D(
+            x_range=[-0.09 * _PIXELS, 1.03 * _PIXELS], y_range=[-0.03 * _PIXELS, 1.08 * _PIXELS]
+        ),
         contents=[f"+ /{sheet.root}/**", f"- /{sheet.root}/price/**", f"- /{sheet.root}/nearest/**"],
     )
     over = rrb.TimeAxis(view_range=rrb.TimeRange(rrb.TimeRangeBoundary.infinite(), rrb.TimeRangeBoundary.infinite()))

@@ -34,7 +34,7 @@ def draw(flight: Flight, lambda_m4: float, path: Path) -> None:
         line = Line(route.name, route.curve_m, MODERN, 4.0)
         sheet.draw_line(recording, line)
         sheet.draw_price(recording, line, flight.threats, lambda_m4)
-        sheet.draw_points(recording, "waypoints", points[1:-1, :2])
+        sheet.draw_points(recording, "waypoints", points[1:-1, :2], 3.5)
         sheet.draw_ends(recording, route.curve_m[0], route.curve_m[-1])
         if flight.final is not None:
             final = np.stack([route.curve_m[-1], flight.final.meets_m, flight.final.aims_m])

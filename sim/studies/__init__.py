@@ -21,6 +21,7 @@ STUDIES = (
     "reconstruction",
     "dead-reckoning",
     "flows",
+    "routes",
     "ship",
 )  # the modules of this package that have a `run`, `-` for `_`
 
