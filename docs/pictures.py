@@ -12,6 +12,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from gateway.settings import DEMO_SITE, format_site
+
 DOCS = Path(__file__).resolve().parent
 OUT = DOCS / "pictures"
 FLIGHT = DOCS.parent / "tests" / "data" / "sitl-landing-excerpt.tlog"
@@ -92,6 +94,13 @@ def main() -> None:
         talkdown("simulate", "conflicts", "--set", "aircraft=10", "--set", "duration_s=420", *few, *MAX, work / "near")
         talkdown("replay", only_session(work / "near"), "--viewer", "none", "--archive", work / "told")
         draw(only_session(work / "told") / "session.rrd", "conflict", "--at", "0.64", *SCENE)
+        field = work / "demo.toml"
+        field.write_text(format_site(DEMO_SITE), encoding="utf-8")
+        threatened = ("--seed", "2", "--speed", "28", "--height", "200")
+        talkdown("plan", *threatened, "--site", field, "--out", work / "route")
+        talkdown("simulate", work / "route.plan", "--site", field, *MAX, work / "flown")
+        talkdown("replay", only_session(work / "flown"), "--viewer", "none", "--archive", work / "circle")
+        draw(only_session(work / "circle") / "session.rrd", "circle", "--at", "0.82")
         talkdown("simulate", "spoofed", *MAX, work / "false")
         talkdown("replay", only_session(work / "false"), "--viewer", "none", "--archive", work / "denied")
         draw(only_session(work / "denied") / "session.rrd", "spoofed", "--at", "0.72")

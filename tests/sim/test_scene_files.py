@@ -201,8 +201,10 @@ def test_an_inertial_unit_tells_what_is_felt() -> None:
 def test_the_examples_of_the_documentation_can_be_staged(tmp_path: Path) -> None:
     """The whole file of docs/scenes.md, and its faults, of which there is one of each kind."""
     text = (Path(__file__).parents[2] / "docs" / "scenes.md").read_text("utf-8")
-    whole, faults = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    whole, flown, faults = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     (tmp_path / "field.toml").write_text(format_site(DEMO_SITE))
     assert len(staged(whole, tmp_path).aircraft) == 2
+    (tmp_path / "round.plan").write_text("{}")
+    assert parse_scene(HEAD + flown, "docs", tmp_path, "docs").vehicles[0].goes_around == 1
     many = parse_scene(HEAD + VEHICLE + faults, "docs", tmp_path, "docs").faults
     assert {type(one) for one in many} == {known.make for known in FAULTS.values()}
