@@ -20,6 +20,7 @@ Bools = NDArray[np.bool_]
 
 SIZE = 9
 POSITION, VELOCITY, ERROR = slice(0, 3), slice(3, 6), slice(6, 9)
+SURE = 1e4  # S against R: beyond it P - K H P has lost more than four of sixteen digits
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +138,8 @@ def update(
     (Huber's weight): an outlier pulls no more than a bounded amount, and a source that really has jumped is followed.
     Rows in groups of `together` are guesses at one track (`modes`): the noise is raised in all of them by what the nearest
     asks for, so that an outlier does not tell them apart.
-    Joseph's form: the covariance stays symmetric and positive whatever the rounding.
+    The covariance is P - K H P, made symmetric. Where a measurement is so much surer than the state that this loses digits it
+    is Joseph's form (`SURE`): it stays positive whatever the rounding.
     Source: 003 2.4 eq 19, 20.
     """
     missing = np.isnan(innovation)
@@ -169,12 +171,23 @@ def update(
             fit = _square(column, inverse)
     gain = cross @ inverse
     mean = state.mean + (gain @ column)[:, :, 0]
-    reduced = IDENTITIES[size] - gain @ h
-    noise = (gain * r[:, None, :]) @ gain.transpose(0, 2, 1)
-    covariance = reduced @ state.covariance @ reduced.transpose(0, 2, 1) + noise
-    covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))
+    less = gain @ cross.transpose(0, 2, 1)
+    np.subtract(state.covariance, less, out=less)
+    sure = along > SURE * r
+    if sure.any():
+        some = np.flatnonzero(sure.any(axis=1))
+        less[some] = _josephs(state.covariance[some], gain[some], h if len(h) == 1 else h[some], r[some])
+    covariance = less + less.transpose(0, 2, 1)
+    covariance *= 0.5
     told = Innovation(y, s, measured, normalised, outlying, h, inverse, gain, r, fit)
     return Estimate(mean, covariance), told
+
+
+def _josephs(covariance: Floats, gain: Floats, h: Floats, r: Floats) -> Floats:
+    """(I - K H) P (I - K H)' + K R K', which stays positive whatever the rounding."""
+    reduced = IDENTITIES[covariance.shape[1]] - gain @ h
+    noise = (gain * r[:, None, :]) @ gain.transpose(0, 2, 1)
+    return np.asarray(reduced @ covariance @ reduced.transpose(0, 2, 1) + noise)
 
 
 def _square(column: Floats, inverse: Floats) -> Floats:

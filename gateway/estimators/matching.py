@@ -14,7 +14,8 @@ def matched(share: Floats, mean: Floats, covariance: Floats) -> tuple[Floats, Fl
     n, m, j = share.shape
     size = mean.shape[-1]
     within = share.transpose(0, 2, 1) @ covariance.reshape(n, m, size * size)
-    return middle, np.asarray(apart + within.reshape(n, j, size, size))
+    apart += within.reshape(n, j, size, size)
+    return middle, apart
 
 
 def spread(share: Floats, mean: Floats) -> tuple[Floats, Floats]:

@@ -95,8 +95,10 @@ def predict(mixture: Mixture, elapsed_s: Floats, modes: Modes, transition: Float
         mean, covariance = matched(joint / weight[:, None], mean, covariance)
     carry, noise = moved(mean, weight, elapsed_s, modes)
     mean = (carry @ mean[..., None])[..., 0]
-    covariance = carry @ covariance @ carry.swapaxes(-1, -2) + noise
-    covariance = 0.5 * (covariance + covariance.swapaxes(-1, -2))
+    moved_on = carry @ covariance @ carry.swapaxes(-1, -2)
+    moved_on += noise
+    covariance = moved_on + moved_on.swapaxes(-1, -2)
+    covariance *= 0.5
     return Mixture(
         mean=mean,
         covariance=covariance,

@@ -163,6 +163,18 @@ def test_one_track_has_the_bits_that_it_has_among_many() -> None:
         assert said.normalised[0] == told.normalised[i]
 
 
+def test_a_sure_measurement_leaves_its_own_variance() -> None:
+    """A millimetre measured after 10 km leaves the millimetre's variance to nine digits, alone or among others."""
+    h, variance = np.eye(1, 9)[None], np.array([[1e-6], [1e4]])
+    states = start(np.zeros((2, 3)), np.tile(1e8 * np.eye(3), (2, 1, 1)), np.zeros((2, 3)), np.full(2, 100.0), 0.0)
+    after, _ = update(states, np.ones((2, 1)), h, variance)
+    assert after.covariance[:, 0, 0] == pytest.approx(1.0 / (1e-8 + 1.0 / variance[:, 0]), rel=1e-9)
+    for i in range(2):
+        one = slice(i, i + 1)
+        alone, _ = update(Estimate(states.mean[one], states.covariance[one]), np.ones((1, 1)), h, variance[one])
+        assert alone.covariance[0].tobytes() == after.covariance[i].tobytes()
+
+
 def test_an_outlier_pulls_no_more_than_the_limit_allows() -> None:
     """Far outside the robust limit the pull no longer grows as the innovation does, and never beyond the limit's."""
     states = _states(1)
