@@ -58,7 +58,7 @@ def _section(
     course = one.course
     lasted = (int(course.time[-1]) - int(course.time[0])) / 1e9
     parts = [
-        f'<section><div class="grade">{escape(one.grade)}</div>',
+        f'<section id="{number}"><div class="grade">{escape(one.grade)}</div>',
         f"<h1>{escape(one.aircraft)}, {escape(site.name)}</h1>",
         f"<p>Approach {number} of {of} in {escape(name)}: {utc(int(course.time[0]))} UTC, {lasted:.0f} s on final.</p>",
         "<h2>Grade</h2><ul>" + "".join(f"<li>{escape(reason)}</li>" for reason in one.reasons) + "</ul>",

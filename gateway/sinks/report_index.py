@@ -13,12 +13,13 @@ from gateway.sinks.report import utc
 
 GRADES = {"A": "#2e7d32", "B": "#b26a00", "C": "#c62828"}
 _STYLE = """
-body { font: 14px/1.4 system-ui, sans-serif; color: #111; max-width: 1000px; margin: 1.5em auto; padding: 0 1em; }
+body { font: 14px/1.4 system-ui, sans-serif; color: #111; max-width: 1200px; margin: 1.5em auto; padding: 0 1em; }
 h1 { font-size: 1.35em; margin: 0 0 .2em } h2 { font-size: 1.05em; margin: 1.4em 0 .3em }
 table { border-collapse: collapse; width: 100% } td, th { padding: .25em .8em .25em 0; text-align: left; vertical-align: top }
 th { font-weight: 600; border-bottom: 1px solid #999 } tr + tr.first td { border-top: 1px solid #e3e3e3 }
 .grade { font-weight: 700 } .note { color: #555; font-size: .9em } .number { text-align: right; white-space: nowrap }
-.bar { display: flex; height: 1.6em; margin: .6em 0; color: #fff; font-weight: 600 } .bar span { padding-left: .5em }
+.bar { display: flex; margin: .6em 0; color: #fff; font-weight: 600; print-color-adjust: exact } .bar span { padding: .1em .5em }
+td:nth-child(-n+4) { white-space: nowrap }
 @page { size: A4; margin: 12mm }
 @media print { body { margin: 0; max-width: none; padding: 0; font-size: 10.5px } tr { break-inside: avoid }
 a { color: inherit } }
@@ -100,7 +101,8 @@ def _table(entries: Sequence[Entry]) -> str:
     for entry in entries:
         for place, one in enumerate(entry.approaches):
             session = (_link(entry), escape(entry.site)) if not place else ("", "")
-            cells = "".join(f"<td>{text}</td>" for text in (*session, utc(one.began), escape(one.aircraft)))
+            aircraft = f'<a href="{quote(entry.page)}#{place + 1}">{escape(one.aircraft)}</a>'
+            cells = "".join(f"<td>{text}</td>" for text in (*session, utc(one.began), aircraft))
             grade = f'<td class="grade" style="color: {GRADES.get(one.grade, "inherit")}">{escape(one.grade)}</td>'
             reasons = f"<td>{'<br>'.join(map(escape, one.reasons))}</td>"
             touchdown = "".join(

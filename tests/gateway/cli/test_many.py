@@ -195,7 +195,12 @@ def test_the_index_leads_to_every_page_and_says_what_each_approach_is_worth() ->
         Entry("spoiled", "spoiled.html", failure="session.json cannot be read"),
     ]
     text = index("sessions", entries)
-    assert re.findall(r'<a href="([^"]*)">', text) == ["monday.html", "nobody%20came.html"]
+    assert re.findall(r'<a href="([^"]*)">', text) == [
+        "monday.html",
+        "monday.html#1",
+        "monday.html#2",
+        "nobody%20came.html",
+    ]
     assert "2 approaches in 3 sessions" in text
     assert "312 m" in text
     assert "&lt;b&gt;" in text
