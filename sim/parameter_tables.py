@@ -36,7 +36,8 @@ _ANY_SIGN = (
     "time_error_s",
     "abeam_deg",
 )
-_COUNTS = {
+_BOUNDS = {
+    "rate_hz": (0, 1000),
     "aircraft": (0, LARGEST_SYSTEM),
     "radars": (0, 20),
     "first_number": (1, 60_000),
@@ -51,7 +52,7 @@ def checked(name: str, kind: Any) -> Convert:
         return flag
     if kind == Intervals:
         return _intervals
-    low, high = _COUNTS.get(name, (-math.inf if name.endswith(_ANY_SIGN) else 0.0, math.inf))
+    low, high = _BOUNDS.get(name, (-math.inf if name.endswith(_ANY_SIGN) else 0.0, math.inf))
     if name in _PROBABILITIES:
         low, high = 0.0, 1.0
     above = name in _ABOVE_ZERO
