@@ -22,9 +22,13 @@ FIELDS = ("seq", "frame", "command", "param1", "param2", "param3", "param4", "x"
 PATIENCE_S = 100.0
 
 
+_ONE_AT_A_TIME = threading.Lock()  # MAVSDK calls from threads of its own
+
+
 def tell(word: str, value: Any = None) -> None:
     """Print one line."""
-    print(f"{word} {json.dumps(value)}", flush=True)
+    with _ONE_AT_A_TIME:
+        print(f"{word} {json.dumps(value)}", flush=True)
 
 
 def items_of(mission: Path) -> list[MissionItem]:
