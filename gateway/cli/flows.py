@@ -12,7 +12,7 @@ import typer
 from gateway.cli import options as take
 from gateway.cli.arrivals_selected import Selection, document, flown_by, shortcuts, table_of
 from gateway.cli.failures import RunError, UsageError
-from gateway.cli.many import Crew, expanded, failures, tell_failures
+from gateway.cli.many import Crew, expanded, failures, tell_failures, wide_console
 from gateway.cli.places import read_place_deg
 from gateway.cli.spread import spread
 
@@ -186,10 +186,9 @@ def _document(
 def _show(
     tracks: tuple[Track, ...], result: Flows, where: tuple[float, float], left_out: int, beside: Compared | None
 ) -> None:
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(highlight=False)
+    console = wide_console()
     table = Table(box=None, padding=(0, 2, 0, 0))
     headings = ("flow", "flights", "from", "minutes", "+-", "lateral, m", "vertical, m")
     for place, heading in enumerate((*headings, *(() if beside is None else ("procedure", "of them", "aside, m")))):
@@ -228,9 +227,7 @@ def _procedure(flown: dict[str, Any]) -> tuple[str, str, str]:
 
 def _show_procedures(beside: Compared, tracks: tuple[Track, ...]) -> None:
     """Heights are above the airport."""
-    from rich.console import Console
-
-    console = Console(highlight=False)
+    console = wide_console()
     console.print(table_of(beside, tracks))
     for line in shortcuts(beside, tracks):
         console.print(line)
