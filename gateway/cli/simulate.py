@@ -13,7 +13,8 @@ import typer
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
 from gateway.cli.replay_options import read_speed
-from gateway.cli.vehicles import VehicleType, Wanted, simulate_vehicles
+from gateway.cli.spread import spread
+from gateway.cli.vehicles import Wanted, simulate_vehicles
 
 if TYPE_CHECKING:
     from sim.scene import Scene
@@ -46,12 +47,11 @@ Examples:
 
   talkdown simulate vehicle --mission route.plan --wind 8,270,1.5 --archive flights
 """
-_VEHICLE = "For the scene vehicle"
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("simulate", help=_HELP)(simulate)
+    app.command("simulate", help=_HELP)(spread(simulate))
 
 
 def simulate(
@@ -96,53 +96,7 @@ def simulate(
         bool, typer.Option("--list", help="List the scenes that there are, or those in a folder.")
     ] = False,
     shown: Annotated[bool, typer.Option("--show", help="Print the scene's file, to be copied and changed.")] = False,
-    kind: Annotated[
-        VehicleType, typer.Option("--type", help="What it is.", rich_help_panel=_VEHICLE)
-    ] = VehicleType.plane,
-    mission: Annotated[
-        Path | None,
-        typer.Option(
-            "--mission",
-            metavar="FILE",
-            help="What it is to fly: .plan or QGC WPL 110.",
-            show_default=False,
-            rich_help_panel=_VEHICLE,
-        ),
-    ] = None,
-    home: Annotated[
-        str | None,
-        typer.Option(
-            "--home",
-            metavar="LAT,LON[,ALT[,HEADING]]",
-            help="Where it stands: degrees, m above the sea. (default: the mission's, or the runway)",
-            show_default=False,
-            rich_help_panel=_VEHICLE,
-        ),
-    ] = None,
-    count: Annotated[int, typer.Option("--count", metavar="N", help="So many.", rich_help_panel=_VEHICLE)] = 1,
-    wind: Annotated[
-        str | None,
-        typer.Option(
-            "--wind",
-            metavar="SPEED[,FROM[,GUSTS]]",
-            help="m/s, degrees, m/s.",
-            show_default=False,
-            rich_help_panel=_VEHICLE,
-        ),
-    ] = None,
-    start: Annotated[
-        bool, typer.Option("--start", help="Begin the mission without being told.", rich_help_panel=_VEHICLE)
-    ] = False,
-    seconds: Annotated[
-        float | None,
-        typer.Option(
-            "--seconds",
-            metavar="S",
-            help="End after so long, by the vehicle's clock.",
-            show_default=False,
-            rich_help_panel=_VEHICLE,
-        ),
-    ] = None,
+    wanted: Wanted = Wanted(),
     quiet: take.QuietOption = False,
 ) -> None:
     """Play a simulated world."""
@@ -163,9 +117,13 @@ def simulate(
         steer_a_ship(mavlink, settings or [], quiet)
         return
     if scene == "vehicle":
-        wanted = Wanted(kind, mission, home, count, wind, start, seconds, seed or 0)
-        simulate_vehicles(wanted, site, mavlink, speed=pace, archive=archive, quiet=quiet)
+        simulate_vehicles(wanted, site, mavlink, seed=seed or 0, speed=pace, archive=archive, quiet=quiet)
         return
+    if wanted != Wanted():
+        raise UsageError(
+            "--type, --mission, --home, --count, --wind, --start and --seconds belong to the scene vehicle: "
+            "talkdown simulate vehicle."
+        )
     if (scene == "radar") != (watch is not None):
         raise UsageError("--watch belongs to the scene radar: talkdown simulate radar --watch FILE|URL.")
     if watch is not None:

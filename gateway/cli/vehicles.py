@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
@@ -34,22 +38,71 @@ class VehicleType(StrEnum):
     ship = "ship"
 
 
+_PANEL = "For the scene vehicle"
+
+
 @dataclass(frozen=True, slots=True)
 class Wanted:
     """What the command line says of vehicles."""
 
-    kind: VehicleType
-    mission: Path | None
-    home: str | None
-    count: int
-    wind: str | None
-    starts: bool
-    seconds: float | None
-    seed: int
+    kind: Annotated[VehicleType, typer.Option("--type", help="What it is.", rich_help_panel=_PANEL)] = VehicleType.plane
+    mission: Annotated[
+        Path | None,
+        typer.Option(
+            "--mission",
+            metavar="FILE",
+            help="What it is to do: a .plan, or QGC WPL 110.",
+            show_default=False,
+            rich_help_panel=_PANEL,
+        ),
+    ] = None
+    home: Annotated[
+        str | None,
+        typer.Option(
+            "--home",
+            metavar="LAT,LON[,ALT[,HEADING]]",
+            help="Where it stands: degrees, m above the sea, degrees. (default: the mission's home, or the runway)",
+            show_default=False,
+            rich_help_panel=_PANEL,
+        ),
+    ] = None
+    count: Annotated[
+        int, typer.Option("--count", metavar="N", help="How many, side by side.", rich_help_panel=_PANEL)
+    ] = 1
+    wind: Annotated[
+        str | None,
+        typer.Option(
+            "--wind",
+            metavar="SPEED[,FROM[,GUSTS]]",
+            help="m/s, true degrees, one sigma of gusts in m/s; not for ships.",
+            show_default=False,
+            rich_help_panel=_PANEL,
+        ),
+    ] = None
+    start: Annotated[
+        bool, typer.Option("--start", help="Begin the mission without being told.", rich_help_panel=_PANEL)
+    ] = False
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            "--seconds",
+            metavar="S",
+            help="End after so long, by the vehicle's clock.",
+            show_default=False,
+            rich_help_panel=_PANEL,
+        ),
+    ] = None
 
 
 def simulate_vehicles(
-    wanted: Wanted, site: Path | None, mavlink: str, *, speed: float | None, archive: Path | None, quiet: bool
+    wanted: Wanted,
+    site: Path | None,
+    mavlink: str,
+    *,
+    seed: int,
+    speed: float | None,
+    archive: Path | None,
+    quiet: bool,
 ) -> None:
     """Fly them: on a link until Ctrl-C, or with `archive` into a session. Raises UsageError, RunError."""
     import time
@@ -59,17 +112,18 @@ def simulate_vehicles(
     start_ns = time.time_ns() // 4000 * 4000
     if archive is not None and not items:
         raise UsageError("--archive flies a mission to its end: give one with --mission FILE.")
-    fleet = _fleet(wanted, items, home)
-    if wanted.starts or archive is not None:
+    fleet = _fleet(wanted, items, home, seed)
+    if wanted.start or archive is not None:
         _start(fleet)
+    speakers = functools.partial(_speakers, fleet, wanted.kind, seed, start_ns)
     if archive is not None:
-        _write(_speakers(fleet, wanted, start_ns), archive, start_ns, place, wanted, quiet)
+        _write(speakers(), archive, start_ns, place, wanted.seconds, quiet)
         return
     if speed is None:
         raise UsageError(
             "Stations cannot follow --speed max; write a number, or --archive DIR to fly without stations."
         )
-    _serve(fleet, wanted, mavlink, start_ns, speed, quiet)
+    _serve(list(fleet.values()), speakers, wanted, mavlink, speed, quiet)
 
 
 def _items_and_home(wanted: Wanted, place: Place | None) -> tuple[tuple[MissionItem, ...], Home]:
@@ -130,29 +184,31 @@ def _first_course(items: tuple[MissionItem, ...], latitude_rad: float, longitude
     return 0.0
 
 
-def _fleet(wanted: Wanted, items: tuple[MissionItem, ...], home: Home) -> dict[int, Vehicle]:
+def _fleet(wanted: Wanted, items: tuple[MissionItem, ...], home: Home, seed: int) -> dict[int, Vehicle]:
     """The vehicles by their numbers, side by side to the right of the first."""
     from sim.vehicles.steering import Plane
 
     if not 1 <= wanted.count <= _MOST_VEHICLES:
         raise UsageError(f"--count {wanted.count} is not from 1 to {_MOST_VEHICLES}.")
-    wind, plane = _wind(wanted.wind), Plane.about(home)
+    make, plane = _maker(wanted), Plane.about(home)
     return {
-        number: _vehicle(wanted, items, plane.beside(home, _APART_M * (number - 1)), wind, number)
+        number: make(plane.beside(home, _APART_M * (number - 1)), items, seed=seed, system=number)
         for number in range(1, wanted.count + 1)
     }
 
 
-def _vehicle(wanted: Wanted, items: tuple[MissionItem, ...], home: Home, wind: WindParameters, number: int) -> Vehicle:
+def _maker(wanted: Wanted) -> Callable[..., Vehicle]:
+    """A function of home and items that makes a vehicle."""
     from sim.ships.fitting_out import vessel
     from sim.vehicles.flying import HELICOPTER, QUADROTOR, aeroplane, rotorcraft
 
     if wanted.kind is VehicleType.ship:
-        return vessel(home, items, seed=wanted.seed, system=number)
+        return vessel
+    wind = _wind(wanted.wind)
     if wanted.kind is VehicleType.plane:
-        return aeroplane(home, items, wind=wind, seed=wanted.seed, system=number)
+        return functools.partial(aeroplane, wind=wind)
     kind = QUADROTOR if wanted.kind is VehicleType.copter else HELICOPTER
-    return rotorcraft(home, items, kind=kind, wind=wind, seed=wanted.seed, system=number)
+    return functools.partial(rotorcraft, kind=kind, wind=wind)
 
 
 def _wind(text: str | None) -> WindParameters:
@@ -176,21 +232,21 @@ def _start(fleet: dict[int, Vehicle]) -> None:
                 raise UsageError(f"It cannot start: {answer.why}; give a mission with --mission FILE.")
 
 
-def _speakers(fleet: dict[int, Vehicle], wanted: Wanted, start_ns: int) -> list[Speaker]:
+def _speakers(fleet: dict[int, Vehicle], kind: VehicleType, seed: int, start_ns: int) -> list[Speaker]:
     from sim.ships.linked import ShipSpeaker
     from sim.vehicles.speaking import Speaker, sensors_of
 
-    speaks = ShipSpeaker if wanted.kind is VehicleType.ship else Speaker
-    return [speaks.of(number, one, sensors_of(wanted.seed, number), start_ns) for number, one in fleet.items()]
+    speaks = ShipSpeaker if kind is VehicleType.ship else Speaker
+    return [speaks.of(number, one, sensors_of(seed, number), start_ns) for number, one in fleet.items()]
 
 
 def _write(
-    speakers: list[Speaker], archive: Path, start_ns: int, place: Place | None, wanted: Wanted, quiet: bool
+    speakers: list[Speaker], archive: Path, start_ns: int, place: Place | None, seconds: float | None, quiet: bool
 ) -> None:
     from gateway.runtime.folder import FolderError
     from sim.vehicles.recording import write_flight
 
-    longest = _LONGEST_S if wanted.seconds is None else wanted.seconds
+    longest = _LONGEST_S if seconds is None else seconds
     try:
         folder = write_flight(
             speakers,
@@ -220,7 +276,15 @@ def _came_to(speaker: Speaker) -> str:
     return f"{state} after {vehicle.moment.time_s:.0f} s, {reached} of {total} places reached"
 
 
-def _serve(fleet: dict[int, Vehicle], wanted: Wanted, mavlink: str, start_ns: int, speed: float, quiet: bool) -> None:
+def _serve(
+    vehicles: list[Vehicle],
+    speakers: Callable[[], list[Speaker]],
+    wanted: Wanted,
+    mavlink: str,
+    speed: float,
+    quiet: bool,
+) -> None:
+    """Talk on the links, each with speakers of its own."""
     from gateway.runtime.links import open_link
     from gateway.runtime.signals import StopSignals
     from gateway.runtime.urls import MAVLINK_PORT, LinkError
@@ -230,22 +294,21 @@ def _serve(fleet: dict[int, Vehicle], wanted: Wanted, mavlink: str, start_ns: in
     try:
         for url in take.read_urls(mavlink.split(","), MAVLINK_PORT):
             opened.append(open_link(url, is_drained=False))
-        links = [LinkedVehicles(link, _speakers(fleet, wanted, start_ns)) for link in opened]
+        links = [LinkedVehicles(link, speakers()) for link in opened]
         if not quiet:
-            numbers = ", ".join(f"mavlink:{number}" for number in fleet)
+            numbers = ", ".join(f"mavlink:{number}" for number in range(1, len(vehicles) + 1))
             print(
                 f"{wanted.kind.value} {numbers} on {', '.join(str(link.url) for link in opened)}; Ctrl-C ends.",
                 flush=True,
             )
         with StopSignals() as stop:
-            first = next(iter(fleet.values()))
 
             def is_over() -> bool:
-                is_late = wanted.seconds is not None and first.moment.time_s >= wanted.seconds
+                is_late = wanted.seconds is not None and vehicles[0].moment.time_s >= wanted.seconds
                 return is_late or stop() is not None
 
             tell = (lambda text: None) if quiet else (lambda text: print(text, file=sys.stderr, flush=True))
-            serve(list(fleet.values()), links, speed=speed, asked_to_stop=is_over, tell=tell)
+            serve(vehicles, links, speed=speed, asked_to_stop=is_over, tell=tell)
     except LinkError as error:
         raise UsageError(str(error)) from error
     except OSError as error:
