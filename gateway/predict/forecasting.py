@@ -80,7 +80,7 @@ def forecast(
     usual = level_turn_rate(state.speed, site.estimation.bank_rad, site.estimation.turn_rate_rps)
     winds = _winds(predicting, lanes, at)
     through_air = np.sqrt(((state.velocity - winds) ** 2).sum(axis=1))
-    adapts = _adapts(before, stacked, at, state)
+    adapts = _adapts(stacked, at, state)
     now, minds = motions(
         before, at, state.position, state.velocity, state.velocity_sigma, state.sides, usual, through_air, adapts
     )
@@ -120,12 +120,12 @@ def forecast(
     return replace(predicting, remembered=predicting.remembered.after(tracks, minds), gates=gates), made
 
 
-def _adapts(before: Minds, goals: Stacked, at: int, state: State) -> Bools:
+def _adapts(goals: Stacked, at: int, state: State) -> Bools:
     """Who (n,) on a line of its plan is just before its end, or has lately begun it: there it may slow down."""
     said = np.maximum(goals.declared, 0)
     way = goals.route[np.arange(len(said)), said, 0] - state.position
     near = (way * way).sum(axis=1) < (SLOWS_S * np.maximum(state.speed, 1.0)) ** 2
-    lately = at - before.declared_at < NEW_GOAL_S * SECOND
+    lately = at - goals.declared_at < NEW_GOAL_S * SECOND
     return np.asarray(~np.isnan(goals.begins[:, 0]) & (near | lately))
 
 

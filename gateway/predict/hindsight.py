@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-PRIOR = 3.0  # horizons' worth of predictions that were as far off as they should be
+PRIOR = 2.0  # horizons' worth of predictions that were as far off as they should be
 MEMORY = 20.0  # horizons after which what was learnt has faded to a third
 AT_MOST = 4.0  # sigmas: one prediction that is off by more counts no more
 USUAL = 0.7978  # the mean size of a Gaussian's values of sigma 1 that count at most so much

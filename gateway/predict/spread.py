@@ -25,24 +25,25 @@ ALONG_POINTS, ENDS_LANDED, ENDS_ROUND, ROUND_A_POINT, BY_MODEL = range(5)
 # How early or late it is on a way along points, seconds: a share of the time, more for each radian of turns on the way and for
 # each radian that it turned lately, and where it is to fly slower. Beside the way: autopilots wander about a line, swing over
 # after a turn, and more while they are in one. What turns bring is a share of the time in which a turn goes through a radian.
-CRUISE, LATE_A_TURN, LATE_IN_TURN, LATE_SLOWER, LATE_LANDED_S = 0.005, 0.106, 0.08, 0.05, 2.0
+CRUISE, LATE_A_TURN, LATE_IN_TURN, LATE_SLOWER, LATE_LANDED_S = 0.008, 0.106, 0.08, 0.05, 3.0
 # along and across, shares of speed, past the end of the way: it has landed, it circles, nobody knows
+SOON_S = 6.0  # before a way's end: it flares, or turns aside onto a circle
 ROUND_S = 2.5  # half of the time in which it flies the radius of a circle that nobody says
 RESTS, ROUNDS, GOES_ANYWHERE = (0.2, 0.0), (0.25, 0.25), (1.2, 0.7)
-WANDERS_S, WANDERS_FOR_S, WANDERS_A_TURN = 0.116, 40.0, 0.0075
+WANDERS_S, WANDERS_FOR_S, WANDERS_A_TURN = 0.03, 40.0, 0.004
 ROUND_WANDERS_S = 0.3
-SWINGS, SWINGS_NOW, SWINGS_FOR_S = 0.12, 0.5, 4.0
+SWINGS, SWINGS_NOW, SWINGS_FOR_S = 0.11, 0.5, 4.0
 ACCELERATES_S = 1.7  # who changes its speed goes on doing so for this long
 # of the mean square of gusts: how far off the speed that is kept is, and for how many seconds what comes lasts, twice
 CRUISE_OFF, GUST_LASTS_S = 0.3, 10.0
 ON_LINE_RAD = 0.3  # who has turned by more flies along a line between two points
-SETTLES_S = 10.0  # after a turn
+SETTLES_S = 14.0  # after a turn
 EARLY_S, EARLY = 2.0, 0.06  # how much earlier and later the way is looked at
 MANOEUVRES = 0.02  # rad2/s of course: how fast a course wanders that nobody has declared, turns and straights together
 DOUBTED = 0.9  # below this confidence a declared way may also be another one
 LEAST_DOUBT = 0.02  # of an inferred point
 # a told wind may be wrong by so much at first, and for good; an unknown one is this share of the speed
-TOLD_WIND_MPS, WIND_MPS, UNKNOWN_WIND = 2.5, 0.5, 0.1
+TOLD_WIND_MPS, WIND_MPS, UNKNOWN_WIND = 2.5, 0.3, 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +101,7 @@ def spread(
         np.where(lands, RESTS[axis], np.where(rounds, ROUNDS[axis], GOES_ANYWHERE[axis])) * over for axis in (0, 1)
     )
     late = (CRUISE * t) ** 2 + (LATE_A_TURN * turns_s) ** 2 + (LATE_IN_TURN * in_turn_s) ** 2
-    soon = whole.over_s[:, 2 * h : 3 * h] > 0.0
+    soon = t > _ends_s(whole, t)[:, None] - SOON_S
     late = late + (LATE_SLOWER * whole.slower_s[:, :h]) ** 2 + np.where(lands & soon, LATE_LANDED_S**2, 0.0)
     late = late + ends_along * ends_along
     wanders = WANDERS_S**2 * np.where(turned > ON_LINE_RAD, 1.0, 2.0 * (1.0 - np.exp(-t / WANDERS_FOR_S)))
@@ -121,6 +122,12 @@ def spread(
         by_model, (now.speed_sigma[:, None] * t) ** 2, speed * speed * beside_s + _to_side(whole, t) * late
     )
     return Spread(np.sqrt(along), np.sqrt(place + drifts + unknown / 3.0))
+
+
+def _ends_s(whole: Ahead, t: Floats) -> Floats:
+    """When (n,) the ways end, seconds from now; infinite = after all that is foretold."""
+    over_s = whole.over_s[:, 3 * t.shape[1] - 1]
+    return np.where(over_s > 0.0, (1.0 + EARLY) * t[:, -1] + EARLY_S - over_s, np.inf)
 
 
 def _to_side(whole: Ahead, t: Floats) -> Floats:

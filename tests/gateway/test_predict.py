@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gateway.frames import RunwayFrame
-from gateway.observation import AirData, FlightPlan, GpsReport, Heard, Intent, Observation, PlanPoint
+from gateway.observation import AirData, FlightPlan, GpsReport, Heard, Intent, Observation, PlanPoint, VehicleStatus
 from gateway.picture import Picture
 from gateway.pipeline import initial, step
 from gateway.predict import TOGETHER, Predicting
@@ -79,10 +79,10 @@ def rows(
     return found
 
 
-def ahead(pictures: Sequence[Picture]) -> tuple[float, float]:
-    """East and north of the last point foretold for 60 s, from where all begins."""
+def ahead(pictures: Sequence[Picture], horizon_s: float = 60.0) -> tuple[float, float]:
+    """East and north of the last point foretold, from where all begins."""
     last = [picture.predict for picture in pictures if len(picture.predict.made)][-1]
-    row = int(np.flatnonzero(last.horizon_s == 60.0)[-1])
+    row = int(np.flatnonzero(last.horizon_s == horizon_s)[-1])
     return (last.longitude_rad[row] - LONGITUDE) / EAST_RAD, (last.latitude_rad[row] - LATITUDE) / NORTH_RAD
 
 
@@ -158,6 +158,66 @@ def test_a_loiter_is_flown_round_at_the_radius_that_the_mission_says() -> None:
     east, north = ahead(pictures)
     assert math.hypot(east, north - 3000.0) == pytest.approx(900.0, rel=0.03)
     assert rows(pictures)[-1][1:4] == ("two segments", "loiter 1", "declared")
+
+
+def in_mode(mode: int, at_s: float, vehicle_type: int = 1) -> VehicleStatus:
+    """ArduPilot's heartbeat: an aeroplane in AUTO is in mode 10, in RTL in 11."""
+    at = T0 + round(at_s * SECOND)
+    return VehicleStatus(AIRCRAFT, at, at, vehicle_type, 3, True, mode)
+
+
+def home_and(*points: tuple[float, float], home: tuple[float, float]) -> FlightPlan:
+    """A plan with a home."""
+    told = plan(*points)
+    return replace(told, points=(PlanPoint(0, "home", *place(*home), altitude_msl_m=900.0), *told.points))
+
+
+def test_an_aeroplane_of_ardupilot_flies_home_from_the_end_of_its_plan() -> None:
+    """Its only point is 1.5 km ahead, home south of it: in 60 s it comes back. A copter's way ends there, and goes on."""
+    told = home_and((0.0, 3900.0), home=(0.0, -9000.0))
+    east, north = ahead(run([told, goes_to(1), in_mode(10, 0.0), *northward(40)]))
+    assert north < 3500.0
+    east, north = ahead(run([told, goes_to(1), in_mode(3, 0.0, vehicle_type=2), *northward(40)]))
+    assert (east, north) == (pytest.approx(0.0, abs=50.0), pytest.approx(60.0 * 99.5, abs=150.0))
+
+
+def test_who_is_in_the_mode_that_flies_home_goes_home() -> None:
+    """Whatever item its mission is at, from the second on in which its mode is heard; and no more when it is in another one."""
+    told = home_and((9000.0, 3000.0), home=(0.0, 30_000.0))
+    found = rows(run([told, goes_to(1), in_mode(11, 20.0), in_mode(10, 40.0), *northward(50)]))
+    assert {row[2] for row in found if 22.0 <= row[0] < 40.0} == {"home"}
+    assert "home" not in {row[2] for row in found if row[3] == "declared" and not 20.0 <= row[0] <= 41.0}
+
+
+def test_who_is_beside_the_line_of_its_plan_comes_back_to_it() -> None:
+    """The line to its point leads eastward, 600 m north of it, it flies at it: in 60 s it is on it, not on a way from here."""
+    told = [plan((-3000.0, 3000.0), (9000.0, 3000.0)), goes_to(2)]
+    speed = SPEED * math.sqrt(0.5)
+    towards = [report(half / 2, speed * half / 2, 1600.0 + speed * half / 2, 45.0) for half in range(40)]
+    assert ahead(run([*told, *towards]))[1] == pytest.approx(3000.0, abs=30.0)
+
+
+def test_a_landing_is_flown_to_slower_from_the_second_on_in_which_it_is_declared() -> None:
+    """It has not slowed down yet, and will: in 60 s it is where 80 % of its speed lead."""
+    before = plan((0.0, -3000.0), (0.0, 20_000.0))
+    landing = replace(before, points=(before.points[0], replace(before.points[1], kind="landing")))
+    found = {}
+    for name, told in (("waypoint", before), ("landing", landing)):
+        found[name] = ahead(run([told, goes_to(1), goes_to(2, 30.0), *northward(34)]))[1] - SPEED * 33.0
+    assert found["waypoint"] == pytest.approx(60.0 * SPEED, rel=0.02)
+    assert found["landing"] == pytest.approx(0.8 * 60.0 * SPEED, rel=0.02)
+
+
+def test_a_turn_that_begins_is_as_sharp_as_its_corner() -> None:
+    """A second into a turn of 90 degrees the measured rate is half straight flight: in 10 s it has turned all the way."""
+    told = [plan((0.0, 1800.0), (9000.0, 1860.0)), goes_to(1), goes_to(2, 29.0)]
+    turned = report(29.5, 8.0, SPEED * 29.5, 15.0)
+    pictures = run(
+        [*told, *northward(29), report(29.0, 0.0, SPEED * 29.0, 0.0), turned, report(30.0, 30.0, SPEED * 29.9, 30.0)]
+    )
+    east, north = ahead(pictures, 10.0)
+    assert east > 350.0
+    assert north == pytest.approx(1860.0, abs=120.0)
 
 
 def test_further_points_of_a_plan_are_flown_one_after_another() -> None:
