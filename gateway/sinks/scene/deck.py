@@ -28,6 +28,7 @@ STANDING = (
     entity("predict"),
     entity("associate"),
     entity("track"),
+    entity("fuse", "smoothed"),
     entity("site", "waypoint"),
     entity("site", "weather"),
 )
