@@ -25,6 +25,7 @@ from bench.reckoning import reckoning
 from bench.registration import registration
 from bench.replays import help_text, ten_hours, ten_minutes
 from bench.throughput import throughput
+from bench.vehicles import vehicles
 from bench.wires import wires
 
 FLEETS = (1, 30)
@@ -53,6 +54,7 @@ class Part(StrEnum):
     reckoning = "reckoning"
     probing = "probing"
     fleet = "fleet"
+    vehicles = "vehicles"
     memory = "memory"
     hours = "hours"
 
@@ -114,6 +116,9 @@ def _measure(wanted: set[Part], runs: int, seconds: float, traffic_hours: int, c
         if Part.clutter in wanted:
             say("targets in clutter: ours and Stone Soup's trackers")
             figures += clutter(runs, say)
+        if Part.vehicles in wanted:
+            say("simulated vehicles")
+            figures += vehicles(min(runs, 3))
         if Part.registration in wanted:
             say("10 000 pairs of registration, and 1000 a second")
             figures += registration(min(runs, 5))

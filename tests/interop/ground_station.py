@@ -6,6 +6,7 @@ Usage: ground_station.py PORT MISSION
 from __future__ import annotations
 
 import json
+import os
 import sys
 import threading
 import time
@@ -22,13 +23,14 @@ FIELDS = ("seq", "frame", "command", "param1", "param2", "param3", "param4", "x"
 PATIENCE_S = 100.0
 
 
+_OUT = os.fdopen(os.dup(1), "w")
 _ONE_AT_A_TIME = threading.Lock()  # MAVSDK calls from threads of its own
 
 
 def tell(word: str, value: Any = None) -> None:
     """Print one line."""
     with _ONE_AT_A_TIME:
-        print(f"{word} {json.dumps(value)}", flush=True)
+        print(f"{word} {json.dumps(value)}", file=_OUT, flush=True)
 
 
 def items_of(mission: Path) -> list[MissionItem]:
@@ -45,6 +47,7 @@ def items_of(mission: Path) -> list[MissionItem]:
 
 def main() -> None:
     """Do all of it with the first system that is heard."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # MAVSDK logs there, into the middle of our lines
     station = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
     station.add_any_connection(f"udpin://127.0.0.1:{sys.argv[1]}")
     tell("listening")
