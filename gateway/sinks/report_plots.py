@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 WIDTH, HEIGHT = 760, 200
 _LEFT, _RIGHT, _TOP, _BOTTOM = 56, 12, 26, 36
 _TICKS = 6
+_LETTER = 7.0  # of a name, as wide as most
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +64,7 @@ def plot(
         f'<text x="{_LEFT}" y="16" class="title">{escape(title)}</text>',
         *(_grid(x_axis, y_axis, x_name)),
         *(_band(one, x_axis, y_axis) for one in bands),
-        *(_mark(one, x_axis) for one in marks if x_axis.low <= one.x <= x_axis.high),
+        *_marks([one for one in marks if x_axis.low <= one.x <= x_axis.high], x_axis),
         *(_line(one, x_axis, y_axis) for one in lines),
         *_legend([(one.name, one.colour) for one in lines] + [(one.name, one.colour) for one in bands]),
         "</svg>",
@@ -143,12 +144,16 @@ def _band(band: Band, x_axis: _Axis, y_axis: _Axis) -> str:
     return f'<polygon fill="{band.colour}" points="{" ".join(f"{one:.1f},{other:.1f}" for one, other in around)}"/>'
 
 
-def _mark(mark: Mark, x_axis: _Axis) -> str:
-    x = float(x_axis.at(mark.x))
-    return (
-        f'<path class="mark" d="M{x:.1f} {_TOP}V{HEIGHT - _BOTTOM}"/>'
-        f'<text x="{x + 3:.1f}" y="{_TOP + 10}" class="tick">{escape(mark.name)}</text>'
-    )
+def _marks(marks: Sequence[Mark], x_axis: _Axis) -> Iterator[str]:
+    """Lines with their names; a name that would run into the next line stands a row lower."""
+    at = sorted((float(x_axis.at(mark.x)), mark.name) for mark in marks)
+    for place, (x, name) in enumerate(at):
+        room = at[place + 1][0] - x if place + 1 < len(at) else math.inf
+        row = 1 if len(name) * _LETTER > room else 0
+        yield (
+            f'<path class="mark" d="M{x:.1f} {_TOP}V{HEIGHT - _BOTTOM}"/>'
+            f'<text x="{x + 3:.1f}" y="{_TOP + 10 + 12 * row}" class="tick">{escape(name)}</text>'
+        )
 
 
 def _legend(names: Sequence[tuple[str, str]]) -> list[str]:
