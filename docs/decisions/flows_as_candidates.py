@@ -60,9 +60,8 @@ def main() -> None:
                 off[key[1]].append((without[key][0], error))
     for horizon_s, errors in sorted(off.items()):
         rms, median = np.sqrt(np.mean(np.square(errors), axis=0)), np.median(errors, axis=0)
-        print(
-            f"{horizon_s:5.0f} s, {len(errors):5d}: RMS {rms[0]:5.0f} and {rms[1]:5.0f} m, median {median[0]:5.0f} and {median[1]:5.0f} m"
-        )
+        print(f"{horizon_s:5.0f} s, {len(errors):5d} predictions, without flows and with:", end=" ")
+        print(f"RMS {rms[0]:5.0f} and {rms[1]:5.0f} m, median {median[0]:5.0f} and {median[1]:5.0f} m")
 
 
 def foretold(
