@@ -1,6 +1,9 @@
 """Many sessions of scene `traffic` replayed, reported and clustered into flows, by one worker and by two; a long list of them.
 
-python -m bench.archive --sessions 200      by itself, a quarter of an hour; 40 sessions, the default, take three minutes
+python -m bench.archive --sessions 200 --cluster      by itself, 20 minutes; 40 sessions, the default, take three
+
+`--cluster` (pip install '.[cluster]') also replays them on a Dask cluster of two workers, kills one of these in the middle
+and counts the sessions that are complete, and whose tracks are those of a replay without a cluster, bit for bit.
 
 Both counts of workers get the same blocks of sessions, in turns, so that a machine that changes its speed favours neither.
 """
@@ -9,9 +12,13 @@ from __future__ import annotations
 
 import itertools
 import json
+import os
 import shutil
+import signal
+import subprocess
 import sys
 import tempfile
+import time
 from collections import defaultdict
 from collections.abc import Callable
 from functools import partial
@@ -20,7 +27,7 @@ from typing import Annotated
 
 import typer
 
-from bench.measure import Figure, load, machine, run, talkdown
+from bench.measure import Figure, environment, load, machine, run, talkdown
 
 BLOCKS = 4
 WORKERS = (1, 2)
@@ -108,6 +115,34 @@ def _told(wall_s: dict[tuple[str, int], float]) -> str:
     return ", ".join(parts)
 
 
+def killed(folder: Path, sessions: int, say: Say) -> list[Figure]:
+    """The sessions that `archive` made, replayed on a cluster of which a worker is killed."""
+    import pyarrow.parquet as pq
+    from distributed import LocalCluster
+
+    into, alone = folder / "by-cluster", folder / f"by-{WORKERS[0]}"
+    blocks = [str(folder / f"block-{number}") for number in range(BLOCKS)]
+    quiet = {"dashboard_address": None, "local_directory": folder / "dask"}
+    with LocalCluster(n_workers=2, threads_per_worker=1, **quiet) as cluster:
+        arguments = ("--archive", str(into), "--scheduler", cluster.scheduler_address, "--quiet")
+        with subprocess.Popen(talkdown("replay", *blocks, *arguments), env=environment()) as child:
+            while child.poll() is None and len(_complete(into)) < sessions // 2:
+                time.sleep(0.2)
+            os.kill(cluster.workers[0].pid, signal.SIGKILL)
+            say(f"a worker is killed when {len(_complete(into))} are done")
+            code = child.wait()
+    say(f"the command ends with {code}")
+    same = sum(
+        pq.read_table(into / name / "tracks.parquet").equals(pq.read_table(alone / name / "tracks.parquet"))
+        for name in _complete(into)
+    )
+    return [Figure("… on a Dask cluster, a worker killed: complete", "sessions", (float(same),), at_least=sessions)]
+
+
+def _complete(archive: Path) -> list[str]:
+    return [one.name for one in archive.glob("[!.]*")]
+
+
 def listing(folder: Path, runs: int) -> list[Figure]:
     """`talkdown sessions` of a folder of thousands, made of one session's folder: only what a list reads is in them."""
     simulate(0, folder / "one", 5.0)
@@ -124,14 +159,23 @@ def listing(folder: Path, runs: int) -> list[Figure]:
     return [Figure(f"talkdown sessions, {LISTED} of them", "s", samples, 5.0)]
 
 
+def _say(text: str) -> None:
+    print(text, file=sys.stderr)
+
+
 def main(
-    sessions: Annotated[int, typer.Option("--sessions", metavar="N", min=BLOCKS, help="How many.")] = 40,
+    sessions: Annotated[int, typer.Option("--sessions", metavar="N", min=2 * BLOCKS, help="How many.")] = 40,
     seconds: Annotated[float, typer.Option("--seconds", metavar="S", help="How long each is.")] = SECONDS,
+    cluster: Annotated[
+        bool, typer.Option("--cluster", help="Also on a Dask cluster, a worker of which is killed.")
+    ] = False,
 ) -> None:
     """Measure, print a line a figure; exit code 1 where two workers gain too little."""
     print(f"{machine()}; {load()}")
     with tempfile.TemporaryDirectory(prefix="talkdown-bench-") as name:
-        figures = archive(Path(name), sessions, seconds, lambda text: print(text, file=sys.stderr))
+        figures = archive(Path(name), sessions, seconds, _say)
+        if cluster:
+            figures += killed(Path(name), sessions, _say)
         figures += listing(Path(name), 3)
     for one in figures:
         print(

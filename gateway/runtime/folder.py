@@ -137,7 +137,7 @@ def read_record(folder: Path) -> Record:
         raise FolderError(f"{folder} is no session: it has no {SESSION_FILE}.") from error
     except (OSError, ValueError, RecursionError) as error:
         raise FolderError(
-            f"{path} cannot be read ({error}); the session's inputs can still be replayed one by one."
+            f"{path} cannot be read ({error}); `talkdown sessions {folder} --repair` writes it anew from the inputs."
         ) from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise FolderError(f"{path} is not of a format that this version of Talkdown knows.")
