@@ -11,8 +11,8 @@ Floats = NDArray[np.float64]
 
 
 def plot(origin: str, name: str, span_s: float) -> rrb.TimeSeriesView:
-    """A view of lines over so many seconds, wherever the cursor is."""
-    ends = (rrb.TimeRangeBoundary.cursor_relative(seconds=span) for span in (-span_s, span_s))
+    """A view of lines over their first so many seconds, wherever the cursor is."""
+    ends = (rrb.TimeRangeBoundary.absolute(seconds=end_s) for end_s in (0.0, span_s))
     return rrb.TimeSeriesView(origin=origin, name=name, axis_x=rrb.TimeAxis(view_range=rrb.TimeRange(*ends)))
 
 

@@ -25,7 +25,7 @@ IMPROVED: tuple[tuple[str, Method, list[int]], ...] = (
     ("default", "inferred", [230, 30, 40]),
     ("known point", "known point", [60, 120, 255]),
 )
-ALONE: tuple[tuple[str, Method, list[int]], ...] = (("RMIMM", "likeliest mode", [150, 150, 150]),)
+ALONE: tuple[tuple[str, Method, list[int]], ...] = (("RMIMM", "likeliest mode", [190, 110, 230]),)
 MODES = (("straight", [150, 150, 150]), ("left", [60, 120, 255]), ("right", [40, 170, 90]))
 TRUE, MEASURED, POINT, DECOY = [150, 150, 150], [255, 190, 90], [40, 170, 90], [120, 120, 120]
 
@@ -121,3 +121,8 @@ def _draw_flight(recording: rr.RecordingStream, flown: Flight, points: Points, f
         ]
         dots = rr.Points2D(np.array(ahead) * up, colors=[color], radii=-1.25)
         recording.log(f"/figure-4/foretold/{path_of(name)}", dots, static=True)
+    shown = [("flown", TRUE), ("measured", MEASURED), *((name, color) for name, _, color in (*ALONE, *IMPROVED))]
+    least, span = points.place.min(axis=0), float(np.ptp(points.place[:, 1]))
+    places = least + np.array([[-0.4, 0.1 * (len(shown) - place)] for place in range(len(shown))]) * span
+    key = rr.Points2D(places * up, colors=[one for _, one in shown], radii=-4.0, labels=[one for one, _ in shown])
+    recording.log("/figure-4/key", key, static=True)
