@@ -165,8 +165,7 @@ def _positions(scene: Scene, aircraft: Aircraft) -> list[Sayings]:
 
     def raw(index: int) -> Fields:
         which = int(heard[index])
-        at_ns = scene.told_ns(aircraft.name, float(measured.valid_s[which]))
-        return _gps_raw(scene, gps, measured, which, at_ns)
+        return _gps_raw(scene, gps, measured, which, boot_s(scene, aircraft, float(measured.valid_s[which])))
 
     said = Sayings("GPS_RAW_INT", measured.received_s[heard], raw)
     if not gps.velocity:
@@ -189,14 +188,14 @@ def _place(scene: Scene, measured: GpsMeasured, index: int) -> Fields:
     }
 
 
-def _gps_raw(scene: Scene, gps: GpsParameters, measured: GpsMeasured, index: int, at_ns: int) -> Fields:
+def _gps_raw(scene: Scene, gps: GpsParameters, measured: GpsMeasured, index: int, at_boot_s: float) -> Fields:
     (east, north, _), fix = measured.velocity_mps[index], bool(measured.fix[index])
     moves = gps.velocity and fix
     ground_cmps = round(math.hypot(east, north) * 1e2) if moves else _UNKNOWN_16
     course_cdeg = round(math.degrees(math.atan2(east, north)) % 360.0 * 1e2) % 36000 if moves else _UNKNOWN_16
     sigma_mm = round(gps.sigma_m * 1e3) if gps.accuracy_given else 0
     return {
-        "time_usec": at_ns // 1000,
+        "time_usec": round(at_boot_s * 1e6),  # as autopilots tell it, though the message would allow UTC
         "fix_type": _FIX_3D if fix else _NO_FIX,
         **_place(scene, measured, index),
         "eph": 80 if fix else _UNKNOWN_16,

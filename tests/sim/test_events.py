@@ -241,7 +241,7 @@ def test_a_late_radar_clock_moves_stamps_and_nothing_else() -> None:
 
 
 def test_a_position_only_source_says_no_velocity() -> None:
-    """Then there is no GLOBAL_POSITION_INT, and GPS_RAW_INT says that speed and course are unknown."""
+    """Then there is no GLOBAL_POSITION_INT; GPS_RAW_INT says when it was so, and that speed and course are unknown."""
     sent = list(events(_scene("approach", "gps.velocity=false")))
     assert _names(sent)["GLOBAL_POSITION_INT"] == 0
     assert _names(sent)["GPS_RAW_INT"] == 8
@@ -250,6 +250,7 @@ def test_a_position_only_source_says_no_velocity() -> None:
     ]
     assert rows
     assert all(one.velocity_east_mps is None and one.velocity_up_mps is None for one in rows)
+    assert {round((one.valid_at - START_NS) / 1e6) % 1000 for one in rows} == {130}  # 0.13 s, 1.13 s, ..., as measured
 
 
 def test_accuracy_is_said_only_when_asked_for() -> None:
