@@ -57,11 +57,12 @@ def draw(path: Path, seed: int) -> None:
 
 
 def _blueprint() -> rrb.Blueprint:
-    tabs: list[rrb.Container | rrb.View] = []
+    tabs: list[rrb.Container] = []
     for page, title, plots, span_s in PAGES:
         views = [plot(f"/{page}/{name}", heading, span_s) for name, heading in plots]
         tabs.append(rrb.Vertical(*views, name=title))
-    tabs.append(rrb.Spatial2DView(origin="/route", name="A route from above, m east and south"))
+    above = rrb.Spatial2DView(origin="/route", name="a route from above (m east, m south): los, integral, course")
+    tabs.append(rrb.Vertical(above, name="Route"))
     return rrb.Blueprint(rrb.Tabs(*tabs), rrb.TimePanel(timeline="time", state="collapsed"), collapse_panels=True)
 
 
