@@ -18,11 +18,11 @@ _CANDIDATES = 25
 
 def draw(path: Path, cases: list[Case], tasks: list[Task], routes: dict[str, list[Route]], seed: int) -> None:
     """A tab for each scene: white the modern route, cyan the paper's, pink the literal one, grey the curves it came from."""
-    sheets = [Sheet(f"scene {number}", task.box_m) for number, task in enumerate(tasks, 1)]
+    sheets = [Sheet(f"scene_{number}", task.box_m) for number, task in enumerate(tasks, 1)]
     titles = "white: modern; cyan: the paper's; pink: literal; green: optima of triples"
     tabs = [views(sheet, f"{case.name} - {titles}") for sheet, case in zip(sheets, cases, strict=True)]
     for tab, sheet in zip(tabs, sheets, strict=True):
-        tab.name = sheet.root
+        tab.name = sheet.root.replace("_", " ")
     blueprint = rrb.Blueprint(
         rrb.Tabs(*tabs), rrb.TimePanel(timeline="metres", state="collapsed"), collapse_panels=True
     )
