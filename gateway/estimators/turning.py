@@ -19,22 +19,21 @@ SMALL = 0.2  # rad; below it (a - sin a) / a^3 loses digits and its series is ex
 
 @dataclass(frozen=True, slots=True)
 class Shaken:
-    """What shakes m motions, as arrays (m,): densities of acceleration, level and upright, m2/s3, and the source's error."""
+    """What shakes m motions: level density of acceleration (m,), m2/s3, and what follows from all that shakes them."""
 
     level: Floats
-    upright: Floats
-    error_m2: Floats
-    error_time_s: Floats
+    fades: Floats  # (m,) rate at which the source's error is forgotten, not positive, 1/s
+    scale: Floats  # (m, e) of each entry of transition and noise
 
     @classmethod
     def of(cls, motions: Sequence[Motion]) -> Shaken:
         """The level density is the motion's eastern one on both axes: the velocity turns, its noise cannot keep an axis."""
-        return cls(
-            np.array([motion.acceleration_density[0] for motion in motions]),
-            np.array([motion.acceleration_density[2] for motion in motions]),
-            np.array([motion.error_sigma_m**2 for motion in motions]),
-            np.array([motion.error_time_constant_s for motion in motions]),
-        )
+        level = np.array([motion.acceleration_density[0] for motion in motions])
+        upright = np.array([motion.acceleration_density[2] for motion in motions])
+        error_m2 = np.array([motion.error_sigma_m**2 for motion in motions])
+        fades = np.array([-1.0 / motion.error_time_constant_s for motion in motions])
+        by = {"": np.ones_like(level), "level": level, "upright": upright, "error": error_m2}
+        return cls(level, fades, np.stack([share * by[what] for _, _, share, what in _ENTRIES], axis=1))
 
 
 def carried(shaken: Shaken, elapsed_s: Floats, turn_rate: Floats, size: int = SIZE) -> tuple[Floats, Floats]:
@@ -44,42 +43,42 @@ def carried(shaken: Shaken, elapsed_s: Floats, turn_rate: Floats, size: int = SI
     beyond the nine are left at 0.
     Source: 000 2.1.1 eq 3, 4, lost in the print: the coordinated turn of the literature, straight at a rate of 0.
     Deviation: the noise is of the time since the last update, not of a fixed period.
-    The different entries are worked out and then taken to their places: fewer steps, for one track two thirds of the time.
+    Each different entry is a power of the time, times a function of the angle, times what the motion is shaken by; then they
+    are taken to their places.
     """
-    t = np.repeat(elapsed_s[:, None], turn_rate.shape[1], axis=1)
+    t = elapsed_s[:, None]
     angle = t * turn_rate
     amount = np.abs(angle)
-    some = np.maximum(amount, NOTHING)
-    half = 0.5 * some
-    half = np.sin(half) / half
-    entries = np.zeros((_ENTRIES, *angle.shape))
-    sine = np.sin(angle, out=entries[_SINE])
-    np.negative(sine, out=entries[_RIGHT])
-    np.cos(angle, out=entries[_COSINE])
-    np.multiply(t, np.sin(some) / some, out=entries[_ALONG])
-    across = np.multiply(0.5 * t * angle, half * half, out=entries[_ACROSS])
-    np.negative(across, out=entries[_BACK])
-    entries[_ONE], entries[_TIME] = 1.0, t
-    keep = np.exp(-t / shaken.error_time_s, out=entries[_KEEP])
-    bend = _bend(amount)
-    np.multiply(2.0 * t * t, bend, out=entries[_PLACE])
-    np.multiply(0.5 * t * half, half, out=entries[_BOTH])
-    aside = np.multiply(t * angle, bend, out=entries[_ASIDE])
-    np.negative(aside, out=entries[_OTHER])
-    entries[_SPEED] = entries[_CLIMB] = 1.0
-    entries[_HEIGHT], entries[_CLIMBING] = t * t / 3.0, 0.5 * t
-    entries[_PLACE:_HEIGHT] *= t * shaken.level
-    entries[_HEIGHT:_ERROR] *= t * shaken.upright
-    np.multiply(shaken.error_m2, 1.0 - keep * keep, out=entries[_ERROR])
-    by_mode = np.ascontiguousarray(entries.transpose(1, 2, 0))
-    return by_mode.take(_CARRY[:size, :size], axis=-1), by_mode.take(_NOISE[:size, :size], axis=-1)
+    half = 0.5 * np.maximum(amount, NOTHING)
+    sine = np.sin(half)
+    both = sine * np.cos(half)
+    keep = np.exp(t * shaken.fades)
+    shapes = np.empty((*angle.shape, _SHAPES))
+    shapes[..., _FLAT] = 1.0
+    shapes[..., _SINC] = both / half
+    shapes[..., _SINC_HALF] = (sine / half) ** 2
+    shapes[..., _BEND] = _bend(amount, both)
+    np.multiply(shapes[..., _SINC:_BY_RATE], turn_rate[..., None], out=shapes[..., _BY_RATE:_COS])
+    shapes[..., _COS] = 1.0 - 2.0 * (sine * sine)
+    shapes[..., _KEPT] = keep
+    shapes[..., _LOST] = 1.0 - keep * keep
+    square = t * t
+    powers = np.concatenate([np.ones_like(t), t, square, square * t], axis=1)
+    entries = shapes.take(_SHAPE, axis=-1)
+    entries *= powers.take(_POWER, axis=1)[:, None]
+    entries *= shaken.scale
+    return entries.take(_CARRY[:size, :size], axis=-1), entries.take(_NOISE[:size, :size], axis=-1)
 
 
-def _bend(angle: Floats) -> Floats:
-    """(a - sin a) / a^3 of angles that are not negative, 1/6 at 0."""
-    a, square = np.maximum(angle, SMALL), angle * angle
-    series = 1.0 / 6.0 - square * (1.0 / 120.0 - square * (1.0 / 5040.0 - square / 362880.0))
-    return np.where(angle < SMALL, series, (a - np.sin(a)) / (a * a * a))
+def _bend(angle: Floats, half_sine: Floats) -> Floats:
+    """(a - sin a) / a^3 of angles that are not negative, with half of their sines; 1/6 at 0."""
+    square = angle * angle
+    series: Floats = 1.0 / 6.0 - square * (1.0 / 120.0 - square * (1.0 / 5040.0 - square / 362880.0))
+    small = angle < SMALL
+    if small.all():
+        return series
+    a = np.maximum(angle, SMALL)
+    return np.where(small, series, (a - 2.0 * half_sine) / (a * a * a))
 
 
 def _matrix(entries: Mapping[int, Sequence[tuple[int, int]]]) -> Ints:
@@ -91,11 +90,37 @@ def _matrix(entries: Mapping[int, Sequence[tuple[int, int]]]) -> Ints:
     return matrix
 
 
-_ENTRIES = 19
+# functions of the angle a: 1, sin a / a, its square at a / 2, (a - sin a) / a^3, the last three times the rate, cos a; and of the
+# time alone what is left of the source's error, and what noise has put in place of it
+_SHAPES = 10
+_FLAT, _SINC, _SINC_HALF, _BEND, _BY_RATE, _ARC, _SWAY, _COS, _KEPT, _LOST = range(_SHAPES)
+# each entry: function, power of the time, share, and of what
+_ENTRIES = (
+    (_FLAT, 0, 0.0, ""),
+    (_FLAT, 0, 1.0, ""),
+    (_SINC, 1, 1.0, ""),
+    (_ARC, 2, 0.5, ""),
+    (_ARC, 2, -0.5, ""),
+    (_FLAT, 1, 1.0, ""),
+    (_COS, 0, 1.0, ""),
+    (_BY_RATE, 1, 1.0, ""),
+    (_BY_RATE, 1, -1.0, ""),
+    (_KEPT, 0, 1.0, ""),
+    (_BEND, 3, 2.0, "level"),
+    (_SINC_HALF, 2, 0.5, "level"),
+    (_FLAT, 1, 1.0, "level"),
+    (_SWAY, 3, 1.0, "level"),
+    (_SWAY, 3, -1.0, "level"),
+    (_FLAT, 3, 1.0 / 3.0, "upright"),
+    (_FLAT, 2, 0.5, "upright"),
+    (_FLAT, 1, 1.0, "upright"),
+    (_LOST, 0, 1.0, "error"),
+)
+_SHAPE, _POWER = np.array([entry[0] for entry in _ENTRIES]), np.array([entry[1] for entry in _ENTRIES])
 # of the transition
 _ONE, _ALONG, _ACROSS, _BACK, _TIME, _COSINE, _SINE, _RIGHT, _KEEP = range(1, 10)
 # of the noise: level position and velocity, alike on both axes, and what a turn makes of one axis on the other; upright
-_PLACE, _BOTH, _SPEED, _ASIDE, _OTHER, _HEIGHT, _CLIMBING, _CLIMB, _ERROR = range(10, _ENTRIES)
+_PLACE, _BOTH, _SPEED, _ASIDE, _OTHER, _HEIGHT, _CLIMBING, _CLIMB, _ERROR = range(10, len(_ENTRIES))
 _ERRORS = [(6, 6), (7, 7), (8, 8)]
 _CARRY = _matrix(
     {
