@@ -61,7 +61,9 @@ def _blueprint() -> rrb.Blueprint:
     for page, title, plots, span_s in PAGES:
         views = [plot(f"/{page}/{name}", heading, span_s) for name, heading in plots]
         tabs.append(rrb.Vertical(*views, name=title))
-    above = rrb.Spatial2DView(origin="/route", name="a route from above (m east, m south): los, integral, course")
+    above = rrb.Spatial2DView(
+        origin="/route", name="a route (grey) from above, m: los (orange), integral (blue), course (red)"
+    )
     tabs.append(rrb.Vertical(above, name="Route"))
     return rrb.Blueprint(rrb.Tabs(*tabs), rrb.TimePanel(timeline="time", state="collapsed"), collapse_panels=True)
 
@@ -97,7 +99,7 @@ def _draw_route(recording: rr.RecordingStream, seed: int) -> None:
     """A route with three turns, in wind, waves and current, by each law; drawn with north up."""
     recording.log(
         "/route/plan",
-        rr.LineStrips2D([ROUTE.points_m * [1.0, -1.0]], colors=GREY, radii=-1.0, labels="route"),
+        rr.LineStrips2D([ROUTE.points_m * [1.0, -1.0]], colors=GREY, radii=-1.0),
         static=True,
     )
     sea = Sea.drawn(Weather(WIND_RAD, (CURRENT_MPS, 0.0)), SEA, ROUTE_S, (), seed)
@@ -105,5 +107,5 @@ def _draw_route(recording: rr.RecordingStream, seed: int) -> None:
         ship, control = Ship.under_way((), HULL.speed_mps), TrackControl(law)
         voyage = make_voyage(HULL, ship, autopilot("pid", SEA), sea, ROUTE_S, route=ROUTE, control=control)
         way = np.stack([voyage.east_m, -voyage.north_m], axis=1)[:: round(5.0 / STEP_S)]
-        strip = rr.LineStrips2D([way], colors=OF_LAW[law], radii=-1.5, labels=law)
+        strip = rr.LineStrips2D([way], colors=OF_LAW[law], radii=-1.5)
         recording.log(f"/route/{law}", strip, static=True)
