@@ -14,7 +14,8 @@ from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
 from gateway.cli.replay_options import read_speed
 from gateway.cli.spread import spread
-from gateway.cli.vehicles import Wanted, simulate_vehicles
+from gateway.cli.vehicle_options import Wanted
+from gateway.cli.vehicles import simulate_vehicles
 
 if TYPE_CHECKING:
     from sim.scene import Scene
