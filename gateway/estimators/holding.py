@@ -10,6 +10,7 @@ Arrays are over n tracks and m modes, as in `modes`. Source: 000 2.1.1; R. Singe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -19,7 +20,6 @@ from numpy.typing import NDArray
 from gateway.estimators.kalman import SIZE
 
 Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 
 WIDE = SIZE + 2
@@ -27,6 +27,7 @@ LONG = 1.0  # time constants: beyond it the closed form keeps its digits, below 
 
 _LEVEL = np.array([0, 1, 3, 4, SIZE, SIZE + 1])  # position, velocity and acceleration, east and north
 _MOVING = _LEVEL[:4]
+_BLOCK = (_LEVEL[:, None] * WIDE + _LEVEL).ravel()  # where these are in a matrix, row after row
 _UNIT = np.eye(2)
 _ORDER = np.array([0, 0, 1, 1, 2, 2])  # which of the three each of these is
 _HELD = SIZE + np.array([0, 1] * 3)  # the acceleration that acts on it
@@ -55,17 +56,17 @@ def turn_along(noise: Floats, course: Floats, share: Floats, most: Floats, uneve
         of_mode[:, _MOVING[:, None], _MOVING] = _along_both(of_mode[:, 0:4:3, 0:4:3], way)
 
 
-def add_held(carry: Floats, noise: Floats, elapsed_s: Floats, course: Floats, held: Held, holds: Bools) -> None:
-    """Fill in what two states more do to transition and noise (n, m, 11, 11) over times (n,): modes (m,) hold, or do not."""
-    sigma2 = held.across_mps2**2
-    turned = _turned(course, np.array([held.along_mps2 / held.across_mps2]))
+def add_held(carry: Floats, noise: Floats, elapsed_s: Floats, course: Floats, held: Held, holds: Sequence[int]) -> None:
+    """Fill in what two states more do to transition and noise (n, m, 11, 11) over times (n,), of which the modes `holds` do."""
+    turned = usual(course, held)
     response, grown = _answers(elapsed_s, held.lasts_s)
-    noise[..., SIZE:, SIZE:] = sigma2 * turned
-    block = _along_both(sigma2 * grown, turned[:, 0])
-    for mode in np.flatnonzero(holds).tolist():
+    noise[..., SIZE:, SIZE:] = turned[:, None]
+    block = _along_both(grown, turned).reshape(-1, len(_BLOCK))
+    for mode in holds:
         carry[:, mode, _LEVEL, _HELD] = response[:, _ORDER]
         noise[:, mode, SIZE:, SIZE:] = 0.0
-        noise[:, mode][:, _LEVEL[:, None], _LEVEL] += block
+        flat = noise[:, mode].reshape(len(noise), -1)  # a view
+        flat[:, _BLOCK] += block
 
 
 def _along_both(parts: Floats, turned: Floats) -> Floats:

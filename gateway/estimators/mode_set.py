@@ -18,7 +18,6 @@ from gateway.estimators.kalman import Motion
 from gateway.estimators.turning import Shaken
 
 Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 Rule = Literal["imm", "rmimm", "literal"]  # what tells the modes apart, see `modes`
 
@@ -57,7 +56,7 @@ class Numbers:
     uneven: Ints  # the places of the u modes whose noise is not alike along and across
     along: Floats  # (u,) of these
     across: Floats  # (u,) m/s2
-    holds: Bools
+    holds: tuple[int, ...]  # places of the modes in which an acceleration lasts
     shaken: Shaken
     stays: Floats  # (m, m), how much likelier than by the shares it is, at first, that a mode stays what it is
     sides: Floats  # (m, 3), 1 where a mode is straight, to the left, to the right
@@ -74,7 +73,7 @@ class Numbers:
             uneven,
             along[uneven],
             np.sqrt(shaken.level[uneven]),
-            np.array([mode.holds for mode in modes]),
+            tuple(place for place, mode in enumerate(modes) if mode.holds),
             shaken,
             np.eye(len(modes)) - share / share.sum(),
             (np.sign(turn)[:, None] == [0.0, 1.0, -1.0]).astype(np.float64),
