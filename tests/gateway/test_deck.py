@@ -15,7 +15,8 @@ from gateway.frames import RunwayFrame, level_axes
 from gateway.observation import Attitude, GpsReport, Observation
 from gateway.predict.approach import Deviations, deviations
 from gateway.settings import DEMO_SITE, Options, Site, SiteError, format_site, parse_site
-from gateway.sinks.scene.deck import DeckScene
+from gateway.sinks.scene.deck import STANDING, DeckScene
+from gateway.sinks.scene.entry import Rows
 from gateway.sinks.scene.flown import Flights
 
 Floats = NDArray[np.float64]
@@ -182,3 +183,16 @@ def test_a_site_that_follows_is_written_and_read_again() -> None:
     assert parse_site(format_site(SITE)).runway.follows == SHIP
     with pytest.raises(SiteError, match="radars on a deck that moves are not understood"):
         parse_site(format_site(replace(SITE, radars=DEMO_SITE.radars)))
+
+
+def test_what_stands_still_is_drawn_where_it_is_from_the_deck(straight: Run) -> None:
+    """The transform of a whole second brings a point that stands still to where `place` has it, within the viewer's float32."""
+    deck, point = DeckScene(SITE), np.array([[1500.0, -700.0, 40.0]])
+    drawn = [one for one in deck.entries(straight.pictures) if isinstance(one, Rows)]
+    assert {one.path for one in drawn} >= set(STANDING)
+    translation, quaternion = (
+        np.array(column.as_arrow_array().flatten().flatten().to_pylist()).reshape(len(drawn[0].time), -1)[-1]
+        for column in drawn[0].columns[:2]
+    )
+    turned = point[0] + 2.0 * np.cross(quaternion[:3], np.cross(quaternion[:3], point[0]) + quaternion[3] * point[0])
+    np.testing.assert_allclose(turned + translation, deck.place(drawn[0].time[-1:], point)[0], atol=2e-3)
