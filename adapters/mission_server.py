@@ -36,6 +36,7 @@ _GUIDED = 2  # `current` of an item that is a guided target
 
 _GLOBAL_FRAMES = frozenset((0, 3, 5, 6, 10, 11))
 _NO_PLACE_FRAMES = frozenset((2,))
+_LARGEST_DEG = 214.0  # what a 32-bit number of degE7 holds; where an item has no place these are parameters
 _TO = ("target_system", "target_component")
 REQUEST_LIST, _read_list = fields("MISSION_REQUEST_LIST", *_TO, "mission_type")
 REQUEST_PARTIAL, _read_partial = fields("MISSION_REQUEST_PARTIAL_LIST", *_TO, "mission_type")
@@ -196,14 +197,12 @@ class MissionServer:
             return UNSUPPORTED
         if item.frame not in _GLOBAL_FRAMES | _NO_PLACE_FRAMES:
             return UNSUPPORTED_FRAME
-        if item.frame in _GLOBAL_FRAMES:
-            if not abs(item.latitude_deg) <= 90.0:
-                return INVALID_X
-            if not abs(item.longitude_deg) <= 180.0:
-                return INVALID_Y
-            if not math.isfinite(item.altitude_m):
-                return INVALID_Z
-        return ACCEPTED
+        north, east = (90.0, 180.0) if item.frame in _GLOBAL_FRAMES else (_LARGEST_DEG, _LARGEST_DEG)
+        if not abs(item.latitude_deg) <= north:  # false for NaN too
+            return INVALID_X
+        if not abs(item.longitude_deg) <= east:
+            return INVALID_Y
+        return ACCEPTED if math.isfinite(item.altitude_m) else INVALID_Z
 
     def _clear(self, kind: int, station: Station) -> tuple[list[Said], Change | None]:
         changes = kind in (_MISSION, _ALL)

@@ -27,9 +27,12 @@ _NO_INDEX = 65535
 
 
 def hear_parameters(
-    message: int, payload: bytes, settings: Mapping[str, float]
+    message: int, payload: bytes, settings: Mapping[str, float], limits: Mapping[str, tuple[float, float]]
 ) -> tuple[list[dict[str, Any]], tuple[str, float] | None]:
-    """One of `TRAFFIC`, for a vehicle with these parameters: the PARAM_VALUEs to answer with, and what is set to what."""
+    """One of `TRAFFIC`, for a vehicle with these parameters: the PARAM_VALUEs to answer with, and what is set to what.
+
+    `limits`: between what a parameter may be; one without is only told.
+    """
     names = sorted(settings)
     if message == REQUEST_LIST:
         return [_value(settings, names, name) for name in names], None
@@ -41,7 +44,8 @@ def hear_parameters(
     name = _text(told)
     if name not in settings:
         return [], None
-    if not math.isfinite(value):
+    least, most = limits.get(name, (math.inf, -math.inf))
+    if not least <= value <= most:  # false for NaN too
         return [_value(settings, names, name)], None
     return [_value({**settings, name: value}, names, name)], (name, value)
 

@@ -37,6 +37,23 @@ NAVIGATION_COMMANDS = frozenset((16, 17, 18, 19, 20, 21, 22, 31, 82, 93))
 MISSION_COMMANDS = NAVIGATION_COMMANDS | frozenset((112, 177, 178, 179, 181, 183, 189, 201, 203, 205, 206, 530))
 """What a mission may hold: what is flown, and what others do on the way (a camera, a servo), which is passed over."""
 
+LIMITS = {
+    "AIRSPEED_CRUISE": (10.0, 140.0),
+    "CRUISE_SPEED": (0.5, 20.0),
+    "LAND_ALT_LOW": (100.0, 10_000.0),
+    "LAND_SPEED": (30.0, 200.0),
+    "NAVL1_PERIOD": (5.0, 60.0),
+    "ROLL_LIMIT_DEG": (10.0, 60.0),
+    "RTL_ALT": (200.0, 300_000.0),
+    "RTL_ALTITUDE": (10.0, 3000.0),
+    "TKOFF_ALT": (10.0, 3000.0),
+    "WPNAV_RADIUS": (50.0, 1000.0),
+    "WPNAV_SPEED": (50.0, 5000.0),
+    "WP_LOITER_RAD": (20.0, 10_000.0),
+    "WP_RADIUS": (1.0, 3000.0),
+}
+"""What stations may set parameters to, in ArduPilot's units."""
+
 _RESULTS = {"accepted": 0, "denied": 2, "unsupported": 3}
 _NO_POSITION, _CUSTOM, _ABOVE_SEA_INT = 0x7, 1, 5
 _ALL_STREAMS, _FORCED, _NOTICE = 0, 21196.0, 5
@@ -74,7 +91,7 @@ class Answerer:
         if message in mission_server.TRAFFIC:
             return self._transfer(message, payload, station, now)
         if message in parameter_server.TRAFFIC:
-            values, change = parameter_server.hear_parameters(message, payload, self.vehicle.settings)
+            values, change = parameter_server.hear_parameters(message, payload, self.vehicle.settings, LIMITS)
             if change is not None:
                 self.vehicle.settings[change[0]] = change[1]
             return [Said("PARAM_VALUE", one) for one in values]
@@ -179,11 +196,13 @@ class Answerer:
     def place(
         self, latitude_deg: float, longitude_deg: float, altitude_m: float, frame: int, radius_m: float | None = None
     ) -> GoTo:
-        """A place on the wire as an order; an altitude that is no number means the present one."""
-        home = self.vehicle.home
+        """A place on the wire as an order; what is no number means the present one."""
+        now, home = self.vehicle.moment, self.vehicle.home
         above = home.geoid_separation_m if frame in (ABOVE_SEA, _ABOVE_SEA_INT) else home.height_m
         height = above + altitude_m if math.isfinite(altitude_m) else None
-        return GoTo(math.radians(latitude_deg), math.radians(longitude_deg), height, radius_m)
+        latitude = math.radians(latitude_deg) if math.isfinite(latitude_deg) else now.latitude_rad
+        longitude = math.radians(longitude_deg) if math.isfinite(longitude_deg) else now.longitude_rad
+        return GoTo(latitude, longitude, height, radius_m)
 
     def _acknowledged(self, command: int, answer: Answer, station: Station) -> list[Said]:
         if answer.why:

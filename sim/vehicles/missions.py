@@ -83,8 +83,8 @@ class Mission:
 
     def _jump(self, at: int, item: MissionItem) -> int:
         """Where a DO_JUMP at `at` leads: to its target so many times (-1: always), then on."""
-        target, times = round(item.parameters[0]), round(item.parameters[1])
-        if not 1 <= target < len(self.items) or (times >= 0 and self._jumped.get(at, 0) >= times):
+        target, times = item.parameters[:2]
+        if not 1 <= target < len(self.items) or (times >= 0 and self._jumped.get(at, 0) >= times) or times != times:
             return at + 1
         self._jumped[at] = self._jumped.get(at, 0) + 1
-        return target
+        return int(target)

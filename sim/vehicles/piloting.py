@@ -27,6 +27,7 @@ from sim.vehicles.steering import Plane, Spot, bearing_rad, distance_m
 
 DECIDES_EVERY_S = 0.1
 _ABOVE_SEA_TOO = 5  # MAV_FRAME_GLOBAL_INT
+_HIGHEST_M = 100_000.0
 ACCEPTED = Answer()
 
 C = TypeVar("C")
@@ -86,7 +87,8 @@ class Pilot(ABC, Generic[C]):
             self._do(to_do)
             self._begun = None
             return ACCEPTED
-        return self.take(order)
+        why = _senseless(order)
+        return Answer("denied", why) if why else self.take(order)
 
     @abstractmethod
     def take(self, order: TakeOff | GoTo | GoAround) -> Answer:
@@ -163,3 +165,13 @@ class Pilot(ABC, Generic[C]):
         away, towards = distance_m(here, target), bearing_rad(here, target)
         above = target.height_m - here.height_m
         self.progress = Progress(away, towards, cross_track_m, above, speed_error_mps)
+
+
+def _senseless(order: TakeOff | GoTo | GoAround) -> str:
+    """Why an order can be nobody's intention; empty for one that can."""
+    height = order.height_m
+    if isinstance(order, GoTo):
+        is_place = abs(order.latitude_rad) <= 0.5 * math.pi and abs(order.longitude_rad) <= math.pi
+        height = 0.0 if height is None else height
+        return "" if is_place and abs(height) <= _HIGHEST_M else "that is no place on earth"
+    return "" if height is None or 0.0 <= height <= _HIGHEST_M else "that is no height to climb to"

@@ -14,7 +14,7 @@ SETTINGS = {"WP_RADIUS": 25.0, "AIRSPEED_CRUISE": 22.0}
 def answered(name: str, **values: Any) -> Any:
     frame = parse(encode(name, {"target_system": 1, "target_component": 1, **values}, system=250))
     assert frame is not None
-    return hear_parameters(frame.message, frame.payload, SETTINGS)
+    return hear_parameters(frame.message, frame.payload, SETTINGS, {"WP_RADIUS": (1.0, 100.0)})
 
 
 def test_the_list_tells_every_parameter_with_its_place() -> None:
@@ -32,9 +32,12 @@ def test_one_parameter_is_told_by_name_or_by_place_and_what_there_is_not_is_not_
     assert answered("PARAM_REQUEST_READ", param_id=b"", param_index=7) == ([], None)
 
 
-def test_a_parameter_is_set_and_told_as_it_is_then_but_never_to_what_is_no_number() -> None:
+def test_a_parameter_is_set_and_told_as_it_is_then_but_never_beyond_its_limits() -> None:
     (told,), change = answered("PARAM_SET", param_id=b"WP_RADIUS", param_value=40.0, param_type=9)
     assert (told["param_value"], change) == (40.0, ("WP_RADIUS", 40.0))
-    (told,), change = answered("PARAM_SET", param_id=b"WP_RADIUS", param_value=math.nan, param_type=9)
-    assert (told["param_value"], change) == (25.0, None)
+    for senseless in (math.nan, math.inf, 0.0, 100.5):
+        (told,), change = answered("PARAM_SET", param_id=b"WP_RADIUS", param_value=senseless, param_type=9)
+        assert (told["param_value"], change) == (25.0, None)
+    (told,), change = answered("PARAM_SET", param_id=b"AIRSPEED_CRUISE", param_value=23.0, param_type=9)
+    assert (told["param_value"], change) == (22.0, None)
     assert answered("PARAM_SET", param_id=b"UNKNOWN", param_value=1.0, param_type=9) == ([], None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import socket
+import struct
 import threading
 from collections import Counter
 from collections.abc import Callable
@@ -11,17 +12,21 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given, settings, strategies
 from pymavlink.dialects.v20 import all as dialect
 
-from adapters.mavlink_frames import encode, parse
+from adapters.mavlink_frames import WHOLE_SIZES, Frame, encode, parse
 from adapters.mission_writing import MissionItem
 from gateway.runtime.links import open_link
 from gateway.runtime.loop import run_replay
 from gateway.runtime.playback import open_playback
 from gateway.runtime.setup import Setup
 from gateway.runtime.urls import Url
+from sim.vehicles.answering import HEARD
+from sim.vehicles.answering import INT as INT_NUMBER
+from sim.vehicles.answering import LONG as LONG_NUMBER
 from sim.vehicles.flying import Flyer, aeroplane, rotorcraft
-from sim.vehicles.motion import Home
+from sim.vehicles.motion import Arm, Home, SetMode
 from sim.vehicles.recording import write_flight
 from sim.vehicles.serving import LinkedVehicles, serve
 from sim.vehicles.speaking import Speaker, fly, sensors_of
@@ -128,6 +133,41 @@ def test_a_lost_fix_and_a_spoofed_one_are_told_as_a_receiver_would(home: Home) -
     assert "GLOBAL_POSITION_INT" not in {found.get_type() for found in said}
 
 
+NUMBERS = strategies.sampled_from((math.nan, math.inf, -math.inf, 0.0, -1.0, 1.0, 2.0, 47.0, 1e5, 1e30))
+COMMANDS = (17, 20, 21, 22, 176, 178, 191, 192, 193, 224, 300, 400, 410, 511, 512, 520, 4711)
+
+
+@strategies.composite
+def said_by_a_station(draw: strategies.DrawFn) -> tuple[int, bytes]:
+    """Any payload in any message that a vehicle hears; numbers and commands that get further than random bytes."""
+    message = draw(strategies.sampled_from(sorted(HEARD)))
+    size = WHOLE_SIZES[message]
+    payload = draw(strategies.binary(min_size=size, max_size=size))
+    if message in (LONG_NUMBER, INT_NUMBER):
+        numbers = draw(strategies.lists(NUMBERS, min_size=7, max_size=7))
+        payload = struct.pack("<7fH", *numbers, draw(strategies.sampled_from(COMMANDS))) + payload[30:]
+    return message, payload
+
+
+@pytest.mark.parametrize("made", [aeroplane, rotorcraft])
+@settings(max_examples=25, deadline=None)
+@given(heard=strategies.lists(said_by_a_station(), min_size=1, max_size=5))
+def test_whatever_a_station_says_a_vehicle_answers_or_not_and_goes_on(
+    made: Callable[..., Flyer], heard: list[tuple[int, bytes]]
+) -> None:
+    """While it stands or flies: nothing that is said to it raises, or makes it say what cannot be sent."""
+    vehicle = made(Home(0.8, 0.15, 500.0), (MissionItem(22, 0.0, 0.0, 30.0), MissionItem(21, 0.0, 0.0, 0.0)))
+    vehicle.order(Arm(True))
+    vehicle.order(SetMode("AUTO"))
+    one = speaker(vehicle)
+    for message, payload in heard:
+        for said in one.answerer.hear(Frame(2, 250, 190, 0, message, payload, False, "good"), 0):
+            assert encode(said.name, said.values, system=1)
+        for _ in range(10):
+            vehicle.step()
+            one.say(0)
+
+
 class GroundStation:
     """pymavlink on a UDP socket: waits for messages, sends others."""
 
@@ -184,6 +224,7 @@ def test_a_ground_station_sends_a_mission_starts_it_and_sees_it_flown(home: Home
             station.send(dialect.MAVLink_command_long_message(1, 1, number, 0, *told))
             assert station.wait("COMMAND_ACK", lambda said, number=number: said.command == number).result == 0
         station.wait("HEARTBEAT", lambda said: said.base_mode & 128)
+        station.wait("MISSION_ITEM_REACHED", lambda said: said.seq == len(items) - 1)
         station.wait("HEARTBEAT", lambda said: not said.base_mode & 128)
     finally:
         stop.set()
