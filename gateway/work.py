@@ -37,7 +37,9 @@ class Turn(IntEnum):
 
 
 TURN_NS = SECOND // 16
-READING_LANES = frozenset(Turn) - {Turn.REGISTERING, Turn.MEETING, Turn.LOOKING_AT_RADARS, Turn.COMPARING}
+READING_LANES = tuple(
+    turn for turn in Turn if turn not in (Turn.REGISTERING, Turn.MEETING, Turn.LOOKING_AT_RADARS, Turn.COMPARING)
+)
 
 
 class Work(Associating):
@@ -91,8 +93,9 @@ class Work(Associating):
         """What is done once a second between the whole seconds: of a crowd it would hold up for long what comes, all at once."""
         if turn in READING_LANES:
             self._settle()
+            self._forget_states(READING_LANES.index(turn), at)
         if turn == Turn.FORGETTING:
-            self._forget(at)
+            self.predicting = self.predicting.forgotten(self.lanes.lanes, self.lanes.by_aircraft, at)
         elif turn == Turn.FORGETTING_MORE:
             self._forget_more(at)
         elif turn == Turn.JUDGING:
@@ -139,12 +142,10 @@ class Work(Associating):
     def _alive(self) -> list[Lane]:
         return [lane for lane in self.lanes.lanes.values() if lane.ended_at is None and lane.events]
 
-    def _forget(self, at: int) -> None:
-        """What is older than the history."""
-        before = at - self.history
-        was, self.lanes = self.lanes, self.lanes.pruned(before)
+    def _forget_states(self, share: int, at: int) -> None:
+        """What is older than the history, of a share of the tracks: to free the states of a crowd takes milliseconds."""
+        was, self.lanes = self.lanes, self.lanes.pruned(at - self.history, share, len(READING_LANES))
         self.settled += fuse.settled(was, self.lanes)
-        self.predicting = self.predicting.forgotten(self.lanes.lanes, self.lanes.by_aircraft, at)
 
     def _forget_more(self, at: int) -> None:
         """What is older than the history of radar tracks and of what was found of them."""

@@ -199,11 +199,11 @@ class Lanes:
             by_key={key: track for key, track in self.by_key.items() if track not in gone},
         )
 
-    def pruned(self, before: int) -> Lanes:
-        """The same with only the last state before an instant, and what came after it, in each lane."""
+    def pruned(self, before: int, share: int, shares: int) -> Lanes:
+        """The same with only the last state before an instant, and what came after it, in each lane of a share of them."""
         changed = {}
         for track, lane in self.lanes.items():
-            if len(lane.events) > 1 and lane.events[1].at < before:
+            if track % shares == share and len(lane.events) > 1 and lane.events[1].at < before:
                 keep = max(bisect_left(lane.events, before, key=lambda event: event.at) - 1, 0)
                 changed[track] = replace(lane, events=lane.events[keep:], whole=False, began_at=lane.began)
         return self.with_lanes(changed) if changed else self
