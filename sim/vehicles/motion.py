@@ -3,8 +3,8 @@
 Whoever builds another kind of vehicle (a ship) gives it the attributes and methods of `Vehicle`; then it speaks MAVLink
 (`speaker`), can be flown interactively (`talkdown simulate vehicle`) and recorded into a scene (`way`).
 
-One vehicle is a few dozen floats and is stepped as such: at 50 steps a second arrays over vehicles pay only from some thirty
-vehicles on, and a single one would be ten times slower (docs/simulated-vehicles.md has the figures).
+One vehicle is a few dozen floats and is stepped as such, fifty times a second: as arrays over vehicles a single one would take
+many times as long, and of a hundred most of the time is encoding what they say (docs/simulated-vehicles.md has the figures).
 """
 
 from __future__ import annotations
