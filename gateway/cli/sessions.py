@@ -85,10 +85,11 @@ def sessions(
     from gateway.runtime.listing import listed
 
     now = datetime.now(UTC)
+    parent = folder if crew.scheduler is None else folder.absolute()
     oldest_s = None if order.keep is None else now.timestamp() - read_length(order.keep, "--keep")
     try:
         with progressing("reading", show=not telling.quiet) as tell:
-            rows = [Row(one) for one in filters.chosen(listed(folder, tell), now)]
+            rows = [Row(one) for one in filters.chosen(listed(parent, tell), now)]
     except FolderError as error:
         raise UsageError(str(error)) from error
     failed = _repair(rows, crew, telling) if order.repair else []

@@ -20,13 +20,18 @@ _STILL_WRITTEN_S = 10.0
 
 
 class Hold:
-    """Holds a folder or a file from now until `release`."""
+    """Holds a folder or a file from now until `release`. Raises BlockingIOError when another process holds it."""
 
     def __init__(self, path: Path) -> None:
         self._descriptor: int | None = None
         if fcntl is not None:
-            self._descriptor = os.open(path, os.O_RDONLY)
-            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            descriptor = os.open(path, os.O_RDONLY)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                os.close(descriptor)
+                raise
+            self._descriptor = descriptor
 
     def release(self) -> None:
         """Let go; calling it again does nothing."""
