@@ -200,10 +200,14 @@ def _write(
 
 def _came_to(speaker: Speaker) -> str:
     """How far its mission came, in a few words."""
+    from sim.vehicles.missions import LAST_NAVIGATION
     from sim.vehicles.recording import is_at_rest
 
     vehicle = speaker.vehicle
-    reached, total = len(set(vehicle.mission.reached)), sum(one.command <= 95 for one in vehicle.mission.items[1:])
+    reached, total = (
+        len(set(vehicle.mission.reached)),
+        sum(one.command <= LAST_NAVIGATION for one in vehicle.mission.items[1:]),
+    )
     state = "at rest" if is_at_rest(speaker) else "still under way"
     return f"{state} after {vehicle.moment.time_s:.0f} s, {reached} of {total} places reached"
 

@@ -14,10 +14,10 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from sim.earth import GRAVITY_MPS2
 from sim.vehicles.body import Body, wrapped
 from sim.vehicles.motion import Vector
 
-GRAVITY_MPS2 = 9.80665
 _ROLL_S, _ROLL_RATE_S, _PATH_S, _PITCH_S, _THRUST_S, _FOLLOWS_S, _ALIGNS_S = 0.5, 0.15, 0.6, 0.4, 0.5, 1.5, 1.0
 _PULL, _PUSH = 0.6, 0.5  # g more and less than level flight
 _LIFT = 1.2  # the most that the wings carry at the slowest speed, over weight

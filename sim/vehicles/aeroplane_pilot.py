@@ -1,8 +1,4 @@
-"""The autopilot of an aeroplane: take-off run, legs, circles, the glide path down to a standstill, going around, home at the end.
-
-Height and speed are held as energy: throttle gives the sum of what climbing and speeding up need, the nose shares it out;
-where the engine gives no more, speed goes before height.
-"""
+"""The autopilot of an aeroplane: take-off run, legs, circles, the glide path to a standstill, going around, home at the end."""
 
 from __future__ import annotations
 
@@ -12,13 +8,14 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from adapters.mission_writing import LAND, LOITER_TO_ALTITUDE, TAKE_OFF, MissionItem
-from sim.vehicles.aeroplane import GRAVITY_MPS2, Aeroplane, Controls
+from sim.earth import GRAVITY_MPS2
+from sim.vehicles.aeroplane import Aeroplane, Controls
+from sim.vehicles.energy import hold_energy
 from sim.vehicles.missions import DELAY, LOITER_TIME, LOITER_TURNS, LOITER_UNLIMITED, RETURN_HOME
 from sim.vehicles.motion import Answer, GoAround, GoTo, TakeOff
 from sim.vehicles.piloting import ACCEPTED, DECIDES_EVERY_S, Pilot
-from sim.vehicles.steering import Leg, OnLeg, Spot, bearing_rad, circle, distance_m, follow, place_on
+from sim.vehicles.steering import Leg, OnLeg, Spot, bearing_rad, circle, distance_m, follow, height_on, place_on
 
-_CLIMB_PER_M, _SPEED_PER_S, _SPEEDING_UP = 0.3, 0.4, 0.15  # 1/s, 1/s, g
 _IN_CIRCLE_M = 30.0  # so near to it a circle counts as begun
 _REACHED_HEIGHT_M = 3.0
 _FLARE_S = 4.0  # the flare begins where the glide path is so many seconds of sinking above the ground
@@ -157,7 +154,7 @@ class AeroplanePilot(Pilot[Controls]):
         pull, _ = self._pull_to(self._leg)
         if self.is_landed:
             return Controls(throttle=1.0, turn_radps=self._steer(pull), may_lift=True)
-        return self._hold_energy(height_m, 0.0, self._cruise(), 0.5 * self._bank(pull))
+        return hold_energy(self.aeroplane, height_m, 0.0, self._cruise(), 0.5 * self._bank(pull))
 
     def _fly_leg(self, item: MissionItem) -> Controls:
         """Along a leg; its height changes evenly over it, as far as the aeroplane can."""
@@ -166,9 +163,9 @@ class AeroplanePilot(Pilot[Controls]):
         pull, on = self._pull_to(leg)
         if on.along_m >= leg.length_m or distance_m(self.here, leg.end) < self._radius_of(item):
             self._reach()
-        height, climb = _height_on(leg, on, self._ground_speed())
+        height, climb = height_on(leg, on, self._ground_speed())
         self._tell(leg.end._replace(height_m=height), on.right_m, self._speed_error())
-        return self._hold_energy(height, climb, self._cruise(), self._bank(pull))
+        return hold_energy(self.aeroplane, height, climb, self._cruise(), self._bank(pull))
 
     def _radius_of(self, item: MissionItem) -> float:
         told = item.parameters[1]
@@ -206,7 +203,7 @@ class AeroplanePilot(Pilot[Controls]):
         north, east, _ = self.body.velocity_mps
         pull, outside = circle(self.here, centre, radius_m, north, east, self.settings["NAVL1_PERIOD"])
         self._tell(centre, -math.copysign(outside, radius_m), self._speed_error())
-        return self._hold_energy(centre.height_m, 0.0, self._cruise(), self._bank(pull))
+        return hold_energy(self.aeroplane, centre.height_m, 0.0, self._cruise(), self._bank(pull))
 
     def _go_home(self, item: MissionItem) -> Controls:
         self._reach()
@@ -225,14 +222,14 @@ class AeroplanePilot(Pilot[Controls]):
         if self.goes_around > 0 and above <= self.decision_m:
             self.goes_around -= 1
             return self._climb_out(self._go_around(item, None))
-        height, climb = _height_on(leg, on, speed)
+        height, climb = height_on(leg, on, speed)
         self._flares |= above < 0.5 * _FLARE_S * -climb or on.along_m > leg.length_m
         if self._flares:
             wanted = -max(2.0 * above / _FLARE_S, _TOUCH_MPS)
             wanted += 0.5 * (wanted + self.body.velocity_mps[2])
             bank = min(max(self._bank(pull), -_FLARE_BANK_RAD), _FLARE_BANK_RAD)
             return Controls(bank, math.asin(max(wanted / self.aeroplane.airspeed_mps, -0.3)))
-        return self._hold_energy(height, climb, self.aeroplane.parameters.approach_mps, self._bank(pull))
+        return hold_energy(self.aeroplane, height, climb, self.aeroplane.parameters.approach_mps, self._bank(pull))
 
     def _roll_out(self, pull: float) -> Controls:
         if self._ground_speed() == 0.0:
@@ -258,7 +255,7 @@ class AeroplanePilot(Pilot[Controls]):
             begins = self.mission.landing_sequence()
             self._leg, self._begun = None, None
             self._do(self.mission.go_to(max(self.mission.current - 1, 1) if begins is None else begins) or [])
-        return self._hold_energy(height_m, 0.0, self._cruise(), self._bank(pull))
+        return hold_energy(self.aeroplane, height_m, 0.0, self._cruise(), self._bank(pull))
 
     def _pull_to(self, leg: Leg) -> tuple[float, OnLeg]:
         on = place_on(leg, self.here)
@@ -283,32 +280,9 @@ class AeroplanePilot(Pilot[Controls]):
     def _speed_error(self) -> float:
         return self._cruise() - self.aeroplane.airspeed_mps
 
-    def _hold_energy(self, height_m: float, climb_mps: float, speed_mps: float, bank_rad: float) -> Controls:
-        """Towards a height that itself climbs, at an airspeed."""
-        plane, p = self.aeroplane, self.aeroplane.parameters
-        speed = max(plane.airspeed_mps, p.slowest_mps)
-        climb = climb_mps + _CLIMB_PER_M * (height_m - self.here.height_m)
-        sine = min(max(climb, -p.sink_mps), p.climb_mps) / speed
-        faster = min(max(_SPEED_PER_S * (speed_mps - plane.airspeed_mps) / GRAVITY_MPS2, -_SPEEDING_UP), _SPEEDING_UP)
-        needs = plane.drag(speed, 1.0 / math.cos(bank_rad))
-        throttle = (needs + sine + faster) / p.thrust
-        if throttle > 1.0:
-            sine = min(sine, p.thrust - needs - max(faster, 0.0))
-        elif plane.airspeed_mps > p.fastest_mps:
-            sine = max(sine, -needs)
-        return Controls(bank_rad, math.asin(min(max(sine, -0.4), 0.4)), min(max(throttle, 0.0), 1.0))
-
     _WAYS: ClassVar[dict[int, Callable[[AeroplanePilot, MissionItem], Controls]]] = {
         TAKE_OFF: _take_off,
         LAND: _land,
         RETURN_HOME: _go_home,
         **dict.fromkeys((LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE, DELAY), _fly_circle),
     }
-
-
-def _height_on(leg: Leg, on: OnLeg, speed_mps: float) -> tuple[float, float]:
-    """Where the leg's straight line is beside the vehicle, and how fast that climbs for one that goes along it, m, m/s."""
-    start, end, length = leg.start.height_m, leg.end.height_m, leg.length_m
-    if not 0.0 < on.along_m < length:
-        return (end if on.along_m > 0.0 or length < 1.0 else start), 0.0
-    return start + (end - start) * on.along_m / length, (end - start) / length * speed_mps

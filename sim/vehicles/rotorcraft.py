@@ -9,10 +9,10 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from sim.earth import GRAVITY_MPS2
 from sim.vehicles.body import Body, wrapped
 from sim.vehicles.motion import Vector
 
-GRAVITY_MPS2 = 9.80665
 _YAW_S = 0.5
 
 

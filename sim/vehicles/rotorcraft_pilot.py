@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from adapters.mission_writing import LAND, LOITER_TO_ALTITUDE, TAKE_OFF, MissionItem
+from sim.earth import GRAVITY_MPS2
 from sim.vehicles.body import wrapped
 from sim.vehicles.missions import DELAY, LOITER_TIME, LOITER_TURNS, LOITER_UNLIMITED, RETURN_HOME
 from sim.vehicles.motion import Answer, GoAround, GoTo, TakeOff
 from sim.vehicles.piloting import ACCEPTED, DECIDES_EVERY_S, Pilot
-from sim.vehicles.rotorcraft import GRAVITY_MPS2, Rotorcraft, Thrust
+from sim.vehicles.rotorcraft import Rotorcraft, Thrust
 from sim.vehicles.steering import Leg, Spot, bearing_rad, distance_m, place_on
 
 _SPEED_PER_S, _PLACE_PER_S, _CLIMB_PER_S, _LEARNS_PER_S2 = 1.2, 0.6, 0.8, 0.15

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gateway.estimators.inertial import from_angles
+from sim.earth import GRAVITY_MPS2
 from sim.vehicles.motion import Moment, Vehicle
 from sim.vehicles.sensing import Sensors, dynamic_pressure_hpa
 from sim.vehicles.steering import Plane
@@ -21,7 +22,7 @@ _ARDUPILOT, _ARMED, _ACTIVE, _STANDBY = 3, 128, 4, 3
 _CUSTOM, _GUIDED, _AUTO, _STABILIZED = 1, 8, 4, 16  # bits of base_mode
 _NO_MISSION, _NOT_BEGUN, _UNDER_WAY, _COMPLETE = 1, 2, 3, 5
 _ON_GROUND, _IN_AIR = 1, 2
-_STANDARD_MPS2, _UNKNOWN_16 = 9.80665, 65535
+_UNKNOWN_16 = 65535
 _SENSES = (
     0x1 | 0x2 | 0x4 | 0x8 | 0x20 | 0x400 | 0x800 | 0x1000 | 0x2000 | 0x4000 | 0x8000 | 0x10000000
 )  # MAV_SYS_STATUS_SENSOR
@@ -163,7 +164,7 @@ class Sayings:
     def _raw(self, moment: Moment) -> Values:
         rate, force = self.sensors.inertial(moment, self.vehicle.step_s)
         whole = {f"{axis}gyro": round(value * 1e3) for axis, value in zip("xyz", rate, strict=True)}
-        whole |= {f"{axis}acc": round(value * 1e3 / _STANDARD_MPS2) for axis, value in zip("xyz", force, strict=True)}
+        whole |= {f"{axis}acc": round(value * 1e3 / GRAVITY_MPS2) for axis, value in zip("xyz", force, strict=True)}
         return {"time_usec": round(moment.time_s * 1e6), **whole, "xmag": 0, "ymag": 0, "zmag": 0, "id": 1}
 
     def _pressure(self, moment: Moment) -> Values:

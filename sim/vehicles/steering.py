@@ -90,6 +90,14 @@ def place_on(leg: Leg, here: Spot) -> OnLeg:
     return OnLeg((n * north + e * east) / length, (e * north - n * east) / length, math.atan2(east, north))
 
 
+def height_on(leg: Leg, on: OnLeg, speed_mps: float) -> tuple[float, float]:
+    """Where the leg's straight line is beside a vehicle, and how fast that climbs for one that goes along it, m, m/s."""
+    start, end, length = leg.start.height_m, leg.end.height_m, leg.length_m
+    if not 0.0 < on.along_m < length:
+        return (end if on.along_m > 0.0 or length < 1.0 else start), 0.0
+    return start + (end - start) * on.along_m / length, (end - start) / length * speed_mps
+
+
 def distance_m(here: Spot, there: Spot) -> float:
     """Level."""
     return math.hypot(there.north_m - here.north_m, there.east_m - here.east_m)
