@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from adapters.mission_writing import MissionItem
 from sim.earth import Flown
 from sim.ships.fitting_out import vessel
+from sim.ships.hull import Weather
 from sim.vehicles.aeroplane import AIRLINER, AeroplaneParameters
 from sim.vehicles.flying import HELICOPTER, QUADROTOR, Flyer, aeroplane, rotorcraft, with_home
 from sim.vehicles.motion import Arm, ChangeSpeed, Home, SetMode, Vehicle
@@ -41,6 +42,8 @@ class FlownWay:
     wind: WindParameters = field(default_factory=WindParameters)
     speed_mps: float | None = None
     goes_around: int = 0
+    steering: str = "pid"  # a ship's autopilot, one of `sim.ships.autopilots.KINDS`
+    current_mps: tuple[float, float] = (0.0, 0.0)  # of the water, east and north
     seed: int = 0
     system: int = 1
     start_s: float = 0.0
@@ -90,7 +93,14 @@ class FlownWay:
     def _vehicle(self) -> Vehicle:
         """It stands at home and is told to go; a ship is at sea, under way."""
         if self.craft == "ship":
-            ship = vessel(self.home, self.items, seed=self.seed, system=self.system)
+            ship = vessel(
+                self.home,
+                self.items,
+                autopilot=self.steering,
+                weather=Weather(current_mps=self.current_mps),
+                seed=self.seed,
+                system=self.system,
+            )
             if self.speed_mps is not None:
                 ship.order(ChangeSpeed(self.speed_mps))
             ship.get_under_way()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,12 +14,12 @@ from sim.faults import Fault
 from sim.parameter_tables import GPS, IMU, RADAR, SAY, with_fields
 from sim.scenes.schemes import SCHEMES
 from sim.scenes.script import Script, Vehicle, Waypoint
-from sim.scenes.tables import DRAWN, FAULTS, SCENE, VEHICLE, WAYPOINT, WIND
+from sim.scenes.tables import DRAWN, FAULTS, SCENE, SEA, VEHICLE, WAYPOINT, WIND
 from sim.scenes.ways import WORDS
 from sim.sensors import GpsParameters
 from sim.vehicles.wind import WindParameters
 
-_TABLES = ("scene", "site", "gps", "imu", "wind", "say", "radar", "vehicle", "fault", *SCHEMES)
+_TABLES = ("scene", "site", "gps", "imu", "wind", "sea", "say", "radar", "vehicle", "fault", *SCHEMES)
 
 
 def read_scene(path: Path) -> Script:
@@ -63,12 +64,19 @@ def parse_scene(text: str, origin: str, folder: Path, name: str) -> Script:
         gps=gps,
         imu=(rows("imu", IMU) or [{}])[0],
         wind=WindParameters(**(rows("wind", WIND) or [{}])[0]),
+        current_mps=_current((rows("sea", SEA) or [{}])[0]),
         say=(rows("say", SAY) or [{}])[0],
         radars=tuple(rows("radar", RADAR)),
         vehicles=vehicles,
         drawn=(schemes[0], rows(schemes[0], DRAWN)[0]["aircraft"]) if schemes else None,
         faults=_faults(document, text, origin),
     )
+
+
+def _current(sea: Mapping[str, float]) -> tuple[float, float]:
+    """Of the water, east and north, m/s."""
+    speed, to = sea.get("speed_mps", 0.0), sea.get("to_rad", 0.0)
+    return speed * math.sin(to), speed * math.cos(to)
 
 
 def _site(document: Mapping[str, Any], file: str | None, text: str, origin: str, folder: Path) -> Site | None:

@@ -39,6 +39,7 @@ class Vehicle:
     abeam_rad: float = 0.0  # the same way seen from the first radar at another bearing, positive to the left
     autopilot: bool = False  # it flies its mission by itself, in the scene's wind
     goes_around: int = 0  # so many landings are broken off, by an autopilot
+    steering: str = "pid"  # a ship's autopilot
     gps: Mapping[str, Any] = field(default_factory=dict)  # fields of GpsParameters that differ from the scene's
 
 
@@ -65,4 +66,5 @@ class Script:
     vehicles: tuple[Vehicle, ...] = ()
     drawn: tuple[str, int] | None = None  # aircraft that are drawn by chance: which scheme, and how many
     wind: WindParameters = WindParameters()
+    current_mps: tuple[float, float] = (0.0, 0.0)  # of the water, east and north
     faults: tuple[Fault, ...] = ()

@@ -88,7 +88,7 @@ def _placed(script: Script, site: Site, seed: int) -> list[_Placed]:
         system = next(free) if vehicle.system is None else vehicle.system
         where = f"{script.origin}: [[vehicle]] {index}"
         if vehicle.autopilot:
-            way: Path | FlownWay = autopilots_way(vehicle, script.wind, site, seed, system, where)
+            way: Path | FlownWay = autopilots_way(vehicle, script, site, seed, system, where)
         else:
             way = way_of(vehicle, site, seed, system, where)
         found.append(_Placed(vehicle, system, way))

@@ -12,6 +12,7 @@ from sim.faults import Fault
 from sim.faulty_sensors import COMPONENTS
 from sim.parameter_tables import checked
 from sim.scene import LARGEST_SYSTEM
+from sim.ships.autopilots import KINDS as STEERING
 
 _RAD = math.pi / 180.0
 _METRES = number(-1e6, 1e6)
@@ -66,6 +67,7 @@ VEHICLE = Table(
         "abeam_deg": ("abeam_rad", number(-180.0, 180.0, scale=_RAD)),
         "autopilot": ("autopilot", flag),
         "goes_around": ("goes_around", whole(0, 10)),
+        "steering": ("steering", text(*STEERING)),
         "gps": ("gps", _gps),
     },
     required=("route",),
@@ -90,6 +92,7 @@ WIND = Table(
         "gust_length_m": ("gust_length_m", number(1.0, 1e4)),
     }
 )
+SEA = Table({"current_mps": ("speed_mps", number(0.0, 10.0)), "current_to_deg": ("to_rad", _COMPASS)})
 DRAWN = Table({"aircraft": ("aircraft", checked("aircraft", int))}, required=("aircraft",))
 
 _WHEN: dict[str, tuple[str, Convert]] = {

@@ -14,10 +14,9 @@ from sim.flown_way import Craft, FlownWay
 from sim.paths import Abeam, CasePath, Delayed
 from sim.paths import Path as Way
 from sim.routes import RoutePath, RoutePoint
-from sim.scenes.script import Vehicle, Waypoint
+from sim.scenes.script import Script, Vehicle, Waypoint
 from sim.scenes.traffic import TRAFFIC_WORDS, one_of_the_traffic
 from sim.vehicles.motion import Home
-from sim.vehicles.wind import WindParameters
 
 WORDS = ("approach", "landing", *TRAFFIC_WORDS)
 USUAL_MPS: dict[Craft, float] = {"aeroplane": 70.0, "airliner": 110.0, "copter": 12.0, "helicopter": 25.0, "ship": 8.0}
@@ -31,10 +30,11 @@ def way_of(vehicle: Vehicle, site: Site, seed: int, system: int, where: str) -> 
     return Delayed(path, vehicle.begin_s) if vehicle.begin_s else path
 
 
-def autopilots_way(vehicle: Vehicle, wind: WindParameters, site: Site, seed: int, system: int, where: str) -> FlownWay:
-    """How a vehicle's own autopilot takes it along its mission, from home, or from the runway's height where there is none.
+def autopilots_way(vehicle: Vehicle, script: Script, site: Site, seed: int, system: int, where: str) -> FlownWay:
+    """How a vehicle's own autopilot takes it along its mission, in the scene's wind and sea.
 
-    It points along the runway where it stands there, else to the first place that the mission leads to. Raises SiteError.
+    It begins at home, or at the first place where there is none, as high as the runway. It points along the runway where
+    it stands there, else to the first place that the mission leads to. Raises SiteError.
     """
     assert isinstance(vehicle.route, Path)
     try:
@@ -54,15 +54,17 @@ def autopilots_way(vehicle: Vehicle, wind: WindParameters, site: Site, seed: int
     heading_rad = _heading_rad(begins, places, site.runway, on_runway=vehicle.craft != "ship")
     stands = Home(math.radians(begins[0]), math.radians(begins[1]), height_m, heading_rad, separation_m)
     return FlownWay(
-        vehicle.craft,
-        stands,
-        items,
-        wind,
-        vehicle.speed_mps,
-        vehicle.goes_around,
-        seed,
-        system,
-        vehicle.begin_s,
+        craft=vehicle.craft,
+        home=stands,
+        items=items,
+        wind=script.wind,
+        speed_mps=vehicle.speed_mps,
+        goes_around=vehicle.goes_around,
+        steering=vehicle.steering,
+        current_mps=script.current_mps,
+        seed=seed,
+        system=system,
+        start_s=vehicle.begin_s,
     )
 
 

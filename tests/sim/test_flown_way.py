@@ -11,6 +11,7 @@ from adapters.mission_writing import LAND, TAKE_OFF, WAYPOINT, MissionItem, form
 from gateway.settings import DEMO_SITE, SiteError
 from sim.earth import plan_of
 from sim.events import events
+from sim.flown_way import FlownWay
 from sim.scene import Scene
 from sim.scenes import parse_scene, stage
 
@@ -26,7 +27,7 @@ HOP = (
     MissionItem(WAYPOINT, 31.0005, 104.0005, 20.0),
     MissionItem(LAND, 31.0005, 104.0009, 0.0),
 )
-SAILS = (MissionItem(WAYPOINT, 31.005, 104.0, 0.0), MissionItem(WAYPOINT, 31.009, 104.001, 0.0))
+SAILS = (MissionItem(WAYPOINT, 31.005, 104.0, 0.0), MissionItem(WAYPOINT, 31.012, 104.002, 0.0))
 
 
 def scene(folder: Path, kind: str, items: tuple[MissionItem, ...], seed: int = 1) -> Scene:
@@ -39,6 +40,9 @@ description = "One vehicle."
 speed_mps = 4.0
 from_deg = 200.0
 gust_sigma_mps = 1.0
+[sea]
+current_mps = 0.5
+current_to_deg = 0.0
 [[vehicle]]
 kind = "{kind}"
 route = "round.plan"
@@ -53,7 +57,9 @@ def test_every_place_is_passed_within_40_m(kind: str, items: tuple[MissionItem, 
     """And at its height within 15 m; it begins at home when it is to begin."""
     given = scene(tmp_path, kind, items)
     (vehicle,) = given.aircraft
+    assert isinstance(vehicle.path, FlownWay)
     assert vehicle.path.start_s == 5.0
+    assert vehicle.path.current_mps == pytest.approx((0.0, 0.5))
     way = given.flown(vehicle, np.arange(*given.present(vehicle), 0.1))
     runway = DEMO_SITE.runway
     x, y = np.array([plan_of(runway, *place) for place in zip(way.latitude_rad, way.longitude_rad, strict=True)]).T
