@@ -22,7 +22,7 @@ _HEIGHT_M = 1.5
 _CREEPS_MPS = 0.6  # along a leg at least, or its end would never come
 _LEAVES_GROUND_M = 2.0  # it climbs so far before it goes anywhere
 _STANDS_S = 1.0
-_MODES = {"STABILIZE": 0, "AUTO": 3, "GUIDED": 4, "LOITER": 5, "RTL": 6, "LAND": 9}
+_MODES = {"STABILIZE": 0, "AUTO": 3, "GUIDED": 4, "LOITER": 5, "RTL": 6, "LAND": 9, "BRAKE": 17}
 
 
 @dataclass
