@@ -18,7 +18,7 @@ from sim.planning import modern
 from sim.planning.areas import Area
 from sim.planning.case import Case, Plane
 from sim.planning.field import LAMBDA_M4, Threats, measure, resampled, stations
-from sim.planning.task import TURN_RADIUS_M, PlanError, Route, Task, box_about
+from sim.planning.task import TOLERANCE_M, TURN_RADIUS_M, PlanError, Route, Task, box_about
 
 Floats = NDArray[np.float64]
 Planner = Callable[[Task], Route]
@@ -128,7 +128,9 @@ def _on_level(case: Case, wishes: Wishes, planner: Planner, runway: Runway | Non
     points = [start, *case.via_m, goal]
     passing = [_unit(after - before) for before, after in zip(points, points[2:], strict=False)]
     courses = [leaving, *passing, arriving]
-    task = Task(start, goal, threats, case.box(*points), areas, wishes.lambda_m4, wishes.turn_radius_m)
+    task = Task(
+        start, goal, threats, case.box(*points), areas, wishes.lambda_m4, wishes.turn_radius_m, aside_m=TOLERANCE_M
+    )
     legs = [
         planner(replace(task, start_m=begin, goal_m=end, start_course=one, goal_course=other))
         for begin, end, one, other in zip(points, points[1:], courses, courses[1:], strict=False)

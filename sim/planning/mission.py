@@ -20,10 +20,10 @@ from adapters.mission_writing import (
     MissionItem,
 )
 from sim.planning.flight import Flight, heights
+from sim.planning.task import TOLERANCE_M
 
 Floats = NDArray[np.float64]
 
-TOLERANCE_M = 15.0  # that the polyline is off the curve at most
 HEIGHT_TOLERANCE_M = 5.0
 _GROUND_SPEED = 1.0  # DO_CHANGE_SPEED's kind 0 is airspeed, 1 ground speed
 _LONGEST = 400  # points of the curve that one straight may replace

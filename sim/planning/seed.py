@@ -60,7 +60,7 @@ def plan(task: Task, seed: int = 0, how: Seed = Seed()) -> Route:
     curves = _chains(task, optima) if how.fit == "chains" else _functions(task, optima)
     kept = []
     for curve in curves:
-        if outside(task.areas, curve).min() >= 0.0:
+        if outside(task.areas, curve).min() >= task.aside_m:
             kept.append(Route(f"seed, {how.objective}", curve, measure(curve, task.threats, task.lambda_m4)))
     if not kept:
         raise PlanError("No curve of the paper's method keeps out of the areas; plan with --method modern.")

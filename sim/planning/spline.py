@@ -40,7 +40,7 @@ _ITERATIONS = 150
 
 @dataclass(frozen=True, slots=True)
 class Bent:
-    """What the search ended at: points (n, 2) m; the least turn radius; how far it is outside the areas, negative inside."""
+    """What the search ended at: points (n, 2) m; the least turn radius; how far it keeps from areas more than asked."""
 
     curve_m: Floats
     turn_radius_m: float
@@ -191,7 +191,7 @@ class _Search:
         turned = np.abs(np.arctan2(_cross(first[:-1], first[1:]), (first[:-1] * first[1:]).sum(axis=-1)))
         step = np.maximum(np.hypot(*np.diff(place, axis=0).T) / _UNIT_M, 1e-9)
         sharpest = max(float(bent.max()), float((turned / step).max()), 1e-9)  # a cusp has no curvature, but turns
-        away = float(outside(self.task.areas, resampled(place, _FINE_M)).min()) - 0.5 * _FINE_M
+        away = float(outside(self.task.areas, resampled(place, _FINE_M)).min()) - 0.5 * _FINE_M - self.task.aside_m
         return Bent(place, _UNIT_M / sharpest, away)
 
     def cost(self, free: Floats, weight: float, wider: float = 1.0) -> tuple[float, Floats]:
@@ -217,7 +217,9 @@ class _Search:
         task = self.task
         density, steep = task.threats.density_and_gradient(place * _UNIT_M)
         rate, by_place = 1.0 + task.lambda_m4 * density, task.lambda_m4 * _UNIT_M * steep
-        aside = max(_ASIDE_M * (min(wider, _SEARCHES[-1][1]) - 1.0) / (_SEARCHES[-1][1] - 1.0), _LEAST_ASIDE_M)
+        aside = task.aside_m + max(
+            _ASIDE_M * (min(wider, _SEARCHES[-1][1]) - 1.0) / (_SEARCHES[-1][1] - 1.0), _LEAST_ASIDE_M
+        )
         for area in task.areas:
             away, outward = area.distance(place * _UNIT_M)
             inside = np.maximum(aside - away, 0.0) / _UNIT_M

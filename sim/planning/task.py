@@ -12,6 +12,7 @@ from sim.planning.field import LAMBDA_M4, Measures, Threats
 
 Floats = NDArray[np.float64]
 
+TOLERANCE_M = 15.0  # that the polyline of a route's waypoints is off its curve at most
 TURN_RADIUS_M = 300.0  # 40 m/s at a bank of 28 degrees
 
 
@@ -22,6 +23,8 @@ class PlanError(ValueError):
 @dataclass(frozen=True, slots=True)
 class Task:
     """A leg to plan on the level: ends (2,) m, threats, areas, and the box (2, 2), low and high corner, that it stays in.
+
+    `aside_m`: how far it keeps from the areas' borders at least.
 
     `start_course`, `goal_course`: unit vectors (2,) along which it leaves and arrives, None where that is free.
     """
@@ -35,6 +38,7 @@ class Task:
     turn_radius_m: float = TURN_RADIUS_M
     start_course: Floats | None = None
     goal_course: Floats | None = None
+    aside_m: float = 0.0
 
     def price(self, place_m: Floats) -> Floats:
         """What a metre of the way costs at places (..., 2): 1 far from threats."""

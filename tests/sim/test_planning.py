@@ -14,12 +14,12 @@ from gateway.settings import DEMO_SITE, SiteError
 from sim.planning import modern
 from sim.planning.areas import Area
 from sim.planning.case import Case, Plane, drawn_case
-from sim.planning.field import Threats, measure
+from sim.planning.field import Threats, measure, resampled
 from sim.planning.files import parse_case
 from sim.planning.flight import Flight, Wishes, heights, plan_flight
-from sim.planning.mission import TOLERANCE_M, mission, waypoints
+from sim.planning.mission import mission, waypoints
 from sim.planning.spline import _Search
-from sim.planning.task import PlanError, Task
+from sim.planning.task import TOLERANCE_M, PlanError, Task
 
 BOX = np.array([[-2e3, -5e3], [12e3, 5e3]])
 START, GOAL = np.array([0.0, 0.0]), np.array([10e3, 0.0])
@@ -124,6 +124,14 @@ def test_few_waypoints_keep_the_polyline_near_the_curve(homeward: Flight) -> Non
     apart = np.hypot(*(from_each - share[..., None] * along).transpose(2, 0, 1)).min(axis=1)
     assert apart.max() <= TOLERANCE_M
     assert heights(homeward).max() == 500.0
+
+
+def test_the_straights_between_waypoints_keep_out_of_areas_too() -> None:
+    """The curve keeps away from them by as much as the straights may be off it."""
+    circle = Area(np.array([[5e3, -1e3]]), 1.2e3)
+    flight = plan_flight(replace(case(circle), threat_m=np.array([[5e3, 3e3]])))
+    assert circle.distance(resampled(waypoints(flight)[:, :2], 5.0))[0].min() >= 0.0
+    assert flight.route.measures.length_m > 10e3 + 10.0  # it goes round
 
 
 def test_a_mission_to_a_runway_ends_on_its_glide_path_and_comes_back_from_the_file(
