@@ -5,6 +5,7 @@ Of each session session.json is read, and the ends of its tables and of its reco
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
@@ -97,12 +98,13 @@ def listed(parent: Path, tell: Callable[[float], None] = lambda share: None) -> 
     """
     folders = session_folders(parent)
     for place, folder in enumerate(folders):
-        yield look(folder)
+        with contextlib.suppress(FileNotFoundError):  # somebody removed it just now
+            yield look(folder)
         tell((place + 1) / len(folders))
 
 
 def look(folder: Path) -> Listed:
-    """One session, completed first where it was killed, with what is wrong with it."""
+    """One session, completed first where it was killed, with what is wrong with it. Raises FileNotFoundError."""
     mended, faults = "", []
     try:
         mended = mend(folder)
@@ -111,7 +113,10 @@ def look(folder: Path) -> Listed:
     except OSError as error:
         faults.append(Fault(f"it could not be completed: {(error.strerror or str(error)).lower()}"))
     sizes = _sizes(folder)
-    written_at = (folder / SESSION_FILE).stat().st_mtime_ns
+    try:
+        written_at = (folder / SESSION_FILE).stat().st_mtime_ns
+    except PermissionError:
+        written_at = folder.stat().st_mtime_ns
     try:
         record = read_record(folder)
     except FolderError as error:
@@ -128,7 +133,7 @@ def _sizes(folder: Path) -> dict[str, int]:
         try:
             with os.scandir(folder / inside) as entries:
                 sizes |= {inside + one.name: one.stat().st_size for one in entries if one.is_file()}
-        except FileNotFoundError:
+        except (FileNotFoundError, PermissionError):
             continue
     return sizes
 

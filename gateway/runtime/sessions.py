@@ -19,8 +19,11 @@ _UNTOLD_NS = 2_000_000_000  # rows are not further ahead of session.json; a stre
 
 
 def is_session(folder: Path) -> bool:
-    """Whether a path is a session's folder."""
-    return (folder / SESSION_FILE).is_file()
+    """Whether a path is a session's folder, or one that may not be looked into: it is not passed over in silence."""
+    try:
+        return (folder / SESSION_FILE).is_file()
+    except PermissionError:
+        return True
 
 
 def session_folders(parent: Path) -> list[Path]:

@@ -6,6 +6,7 @@ import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
@@ -68,6 +69,22 @@ def test_what_is_no_session_is_passed_over_and_what_cannot_be_read_is_named(tmp_
     assert (good.folder.name, good.ended) == ("good", "done")
     assert (spoiled.folder.name, spoiled.ended) == ("spoiled", "unreadable")
     assert "cannot be read" in spoiled.faults[0].what
+
+
+def test_a_folder_that_may_not_be_looked_into_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    closed = _written(tmp_path / "closed", PLAIN)
+    for name in ("is_file", "read_text", "stat"):
+        may = getattr(Path, name)
+
+        def looks(path: Path, *given: Any, may: Any = may, **named: Any) -> Any:
+            if path.parent == closed:
+                raise PermissionError(13, "Permission denied", str(path))
+            return may(path, *given, **named)
+
+        monkeypatch.setattr(Path, name, looks)
+    (one,) = listed(tmp_path)
+    assert one.ended == "unreadable"
+    assert "Permission denied" in one.faults[0].what
 
 
 def test_files_that_are_missing_or_cut_are_named_and_made_again_as_they_were(session: Path) -> None:
