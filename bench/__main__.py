@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from bench.archive import SECONDS, archive, listing
 from bench.clutter import clutter
 from bench.estimation import estimation
 from bench.foretelling import foretelling
@@ -31,6 +32,7 @@ from bench.wires import wires
 FLEETS = (1, 30)
 THROUGHPUT_S = 120.0
 RATES_S = 60.0
+ARCHIVED = 40  # sessions; `python -m bench.archive --sessions 200` by itself
 TRAFFIC_HOURS, MANY_TRAFFIC_HOURS = (
     20,
     100,
@@ -57,13 +59,14 @@ class Part(StrEnum):
     vehicles = "vehicles"
     memory = "memory"
     hours = "hours"
+    archive = "archive"
 
 
 def bench(
     runs: Annotated[int, typer.Option("--runs", metavar="N", min=1, help="How often what is short is measured.")] = 5,
     seconds: Annotated[float, typer.Option("--seconds", metavar="S", min=5.0, help="How long live runs last.")] = 30.0,
     long: Annotated[
-        bool, typer.Option("--long", help="Also replay ten hours, and a hundred of traffic: minutes.")
+        bool, typer.Option("--long", help="Also ten hours, a hundred of traffic, and forty sessions.")
     ] = False,
     only: Annotated[list[Part] | None, typer.Option("--only", help="Only this; repeatable.")] = None,
     json_file: Annotated[
@@ -71,7 +74,7 @@ def bench(
     ] = None,
 ) -> None:
     """Measure what Talkdown costs on this machine. Best on a quiet one: figures are medians, ranges stand beside them."""
-    wanted = set(only or Part) - (set() if long or only else {Part.hours})
+    wanted = set(only or Part) - (set() if long or only else {Part.hours, Part.archive})
     console = Console(width=max(Console().width, 110))
     console.print(f"{machine()}; {load()}")
     figures = _measure(wanted, runs, seconds, MANY_TRAFFIC_HOURS if long else TRAFFIC_HOURS, Console(stderr=True))
@@ -137,6 +140,8 @@ def _measure(wanted: set[Part], runs: int, seconds: float, traffic_hours: int, c
         if Part.memory in wanted:
             say(f"what is held after {traffic_hours} hours of traffic that comes and goes\n{HEADINGS}")
             figures += hundred_hours(say, traffic_hours)
+        if Part.archive in wanted:
+            figures += archive(folder, ARCHIVED, SECONDS, say) + listing(folder, min(runs, 3))
         if Part.hours in wanted:
             figures += ten_hours(folder, say)
     return figures
