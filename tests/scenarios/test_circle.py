@@ -34,7 +34,7 @@ def test_from_a_plan_to_a_report(tmp_path: Path, talkdown: Callable[..., Any]) -
     flown = talkdown("simulate", tmp_path / "route.plan", "--site", site, *changes, "--archive", tmp_path / "sim")
     assert flown.code == 0, flown.err
     (session,) = (tmp_path / "sim").iterdir()
-    replay = ("--from", "4:00", "--viewer", "none", "--archive", tmp_path / "out", "--json")
+    replay = ("--from", "5:00", "--viewer", "none", "--archive", tmp_path / "out", "--json")
     replayed = talkdown("replay", session, *replay)
     assert replayed.code == 0, replayed.err
     assert replayed.summary["observations"]["flight plans"] >= 1
