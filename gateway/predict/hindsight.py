@@ -27,8 +27,8 @@ Bools = NDArray[np.bool_]
 
 PRIOR = 2.0  # horizons' worth of predictions that were as far off as they should be
 MEMORY = 20.0  # horizons after which what was learnt has faded to a third
-AT_MOST = 4.0  # sigmas: one prediction that is off by more counts no more
-USUAL = 0.7978  # the mean size of a Gaussian's values of sigma 1 that count at most so much
+AT_MOST = 3.0  # sigmas: one prediction that is off by more counts no more, or few would make all others' too large
+USUAL = 0.7971  # the mean size of a Gaussian's values of sigma 1 that count at most so much
 LEAST, MOST = 1.0 / 3.0, 3.0  # scales
 LEAST_SIGMA_M = 0.01
 FRESH_S = 2.0  # a track without a measurement for longer does not know where it is

@@ -13,6 +13,7 @@ from gateway.picture import Picture
 from gateway.pipeline import initial, step
 from gateway.predict import TOGETHER, Predicting
 from gateway.predict.minds import UNKNOWN, Remembered
+from gateway.predict.modes import returning
 from gateway.predict.predicting import FEW
 from gateway.predict.told import Tellings
 from gateway.settings import DEMO_SITE, Options, Site, Waypoint
@@ -181,6 +182,24 @@ def test_an_aeroplane_of_ardupilot_flies_home_from_the_end_of_its_plan() -> None
     assert (east, north) == (pytest.approx(0.0, abs=50.0), pytest.approx(60.0 * 99.5, abs=150.0))
 
 
+@pytest.mark.parametrize(
+    ("vehicle_type", "autopilot", "mode", "home"),
+    [
+        (1, 3, 11, True),
+        (1, 3, 10, False),
+        (2, 3, 6, True),
+        (2, 3, 11, False),
+        (10, 3, 11, True),
+        (1, 12, 5 << 24 | 4 << 16, True),
+        (1, 12, 4 << 24 | 4 << 16, False),
+        (1, 0, 11, False),
+    ],
+)
+def test_modes_that_fly_home_are_known(vehicle_type: int, autopilot: int, mode: int, home: bool) -> None:
+    """ArduPilot's aeroplanes, copters and rovers have numbers of their own, PX4 has one; of others nobody knows."""
+    assert returning(VehicleStatus(AIRCRAFT, T0, T0, vehicle_type, autopilot, True, mode)) is home
+
+
 def test_who_is_in_the_mode_that_flies_home_goes_home() -> None:
     """Whatever item its mission is at, from the second on in which its mode is heard; and no more when it is in another one."""
     told = home_and((9000.0, 3000.0), home=(0.0, 30_000.0))
@@ -263,11 +282,13 @@ def test_without_any_goal_there_is_the_model_and_no_intent() -> None:
 
 
 def test_how_arrivals_fall_into_ticks_changes_no_bit() -> None:
-    """Plans, intents and winds among the reports: ticks of one arrival and one of everything foretell the same."""
+    """Plans, intents, modes and winds among the reports: ticks of one arrival and one of everything foretell the same."""
     wind = [
         AirData(AIRCRAFT, T0 + k * SECOND, T0 + k * SECOND, wind_east_mps=4.0, wind_north_mps=1.0) for k in range(9)
     ]
-    said = [plan((0.0, 900.0), (4000.0, 900.0)), goes_to(1), goes_to(2, 14.0), *wind, *northward(20)]
+    told = home_and((0.0, 900.0), (4000.0, 900.0), home=(0.0, -9000.0))
+    modes = [in_mode(10, 0.0), in_mode(11, 17.0)]
+    said = [told, goes_to(1), goes_to(2, 14.0), *modes, *wind, *northward(20)]
     columns = ("made", "latitude_rad", "longitude_rad", "height_m", "sigma_along_m", "sigma_across_m", "confidence")
     one, all_at_once = (
         [np.concatenate([getattr(picture.predict, name) for picture in run(said, together=count)]) for name in columns]
