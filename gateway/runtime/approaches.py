@@ -51,7 +51,9 @@ def approaches_of(session: Path) -> Reported:
     except SiteError as error:
         raise FolderError(f"The site in {session} is not understood: {error}") from error
     if site.runway.follows is not None:
-        raise FolderError(f"The runway of {session} follows a ship: reports judge approaches to runways that stand still.")
+        raise FolderError(
+            f"The runway of {session} follows a ship: reports judge approaches to runways that stand still."
+        )
     more = ("received", "track", "updated_by", "state", "radar_track")
     tracks = read_table(session, "tracks", [*_COLUMNS, *_VELOCITIES, *more])
     has_truth = (session / "truth.parquet").is_file()
