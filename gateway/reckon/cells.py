@@ -78,7 +78,7 @@ def cells(told: Told, first: int, end: int) -> Cells:
     inertial, n = told.inertial, end - first
     means = _means(inertial, first - 1, n + 1)
     attitude, turned = _attitudes(told, means[:, 3:6], first, n)
-    unseen = _unseen(inertial, first, n)
+    unseen = _unseen(inertial, first, n) if told.noise is None else np.broadcast_to(told.noise, (n, 6))
     place, place_late = _first_of_blocks(told.places, first, n)
     pictured, pictured_late = _first_of_blocks(told.pictured, first, n)
     airspeed, altitude = (_last(told.series[kind], first, n)[0][:, 0] for kind in (AIRSPEED, ALTITUDE))

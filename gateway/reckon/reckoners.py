@@ -17,10 +17,10 @@ from gateway.observation import Observation
 from gateway.reckon.cells import CELL_NS, SECOND, Cells, cells, covered_until
 from gateway.reckon.reckoned import Floats, Reckoned, reckoned, wind_mps
 from gateway.reckon.running import run
-from gateway.reckon.ties import Kinds
+from gateway.reckon.ties import WINGS, Kinds
 from gateway.reckon.tip import NOTHING
-from gateway.reckon.told import INERTIAL, PLACE, Series, before, by_share, portioned, tells_inertial
-from gateway.reckon.vehicle import Reckoner, begun_or_kept, pruned, untouched, with_portion
+from gateway.reckon.told import AIRSPEED, INERTIAL, PLACE, Series, Told, before, by_share, portioned, tells_motion
+from gateway.reckon.vehicle import Reckoner, begun_or_kept, moving, pruned, untouched, with_portion
 from gateway.settings import DeadReckoning
 
 VEHICLES_AT_MOST = 200
@@ -112,6 +112,11 @@ class Reckoners:
         reckoner = self.by_aircraft.get(aircraft)
         return NOTHING if reckoner is None or reckoner.tip is None else int(reckoner.tip.denied[0])
 
+    def by_flight(self, aircraft: str) -> bool:
+        """Whether no unit tells how a vehicle moves, but its attitude and its airspeed do."""
+        reckoner = self.by_aircraft.get(aircraft)
+        return reckoner is not None and reckoner.by_flight
+
     def suspecting(self, aircraft: str) -> Reckoners:
         """The same where a vehicle's position was refused as it came: that one is among the first to go on."""
         return self if aircraft in self.suspects else replace(self, suspects=(*self.suspects, aircraft))
@@ -126,7 +131,8 @@ class Reckoners:
             told += now
             if rest:
                 later.append((added, tuple(rest)))
-        new = sorted(tells_inertial(told) - {*self.by_aircraft})
+        winged = {name for name, one in self.types.items() if one in WINGS}
+        new = sorted(tells_motion(told, winged) - {*self.by_aircraft})
         room = max(VEHICLES_AT_MOST - len(self.by_aircraft), 0)
         known = {**self.by_aircraft, **{name: Reckoner() for name in new[:room]}}
         parts = _parts(tuple(known), self.suspects, at)
@@ -153,26 +159,37 @@ class Reckoners:
         changed: dict[str, Reckoner] = {}
         running: list[tuple[str, Reckoner, Cells]] = []
         for aircraft in share.names:
-            was = self.by_aircraft[aircraft]
-            told, since = with_portion(was.told, portion.get(aircraft, {}))
-            if aircraft in by_place:
+            was, part = self.by_aircraft[aircraft], portion.get(aircraft, {})
+            is_new = INERTIAL in part and not was.by_flight and not len(was.told.series[INERTIAL].at)
+            was = Reckoner() if is_new else was  # a unit's vehicle is one from its first sample on
+            told, since = with_portion(was, part)
+            if aircraft in by_place and not is_new:
                 more = by_place[aircraft]
                 told, since = replace(told, places=told.places.with_more(more)), min(since, int(more.at[0]))
-            reckoner = begun_or_kept(replace(was, told=told), since, share.at, settings)
+            has_wings = self.types.get(aircraft) in WINGS
+            reckoner, moves = moving(replace(was, told=told), has_wings)
+            reckoner = begun_or_kept(reckoner, moves, since, share.at, settings)
             changed[aircraft] = reckoner
-            end = 0 if reckoner.tip is None else covered_until(told, int(reckoner.tip.cell[0]))
+            end = 0 if reckoner.tip is None else covered_until(moves, int(reckoner.tip.cell[0]))
             if reckoner.tip is not None and end > reckoner.tip.cell[0]:
-                running.append((aircraft, reckoner, cells(told, int(reckoner.tip.cell[0]), end)))
+                running.append((aircraft, reckoner, cells(moves, int(reckoner.tip.cell[0]), end)))
         changed |= self._run(running, settings)
         kept = {aircraft: pruned(one, share.at - history_ns, settings) for aircraft, one in changed.items()}
-        gone = {aircraft for aircraft, one in kept.items() if not len(one.told.series[INERTIAL].at)}
+        gone = {aircraft for aircraft, one in kept.items() if self._tells_nothing(aircraft, one.told)}
         alive = {name: one for name, one in {**self.by_aircraft, **kept}.items() if name not in gone}
         return replace(self, by_aircraft=alive, planned=tuple(planned))
+
+    def _tells_nothing(self, aircraft: str, told: Told) -> bool:
+        """Whether a vehicle is not heard any more of how it moves."""
+        tells = (INERTIAL, AIRSPEED) if self.types.get(aircraft) in WINGS else (INERTIAL,)
+        return not any(len(told.series[kind].at) for kind in tells)
 
     def _run(self, running: Sequence[tuple[str, Reckoner, Cells]], settings: DeadReckoning) -> dict[str, Reckoner]:
         if not running:
             return {}
-        kinds = Kinds.of([self.types.get(aircraft) for aircraft, _, _ in running])
+        kinds = Kinds.of(
+            [self.types.get(aircraft) for aircraft, _, _ in running], [not one.by_flight for _, one, _ in running]
+        )
         tips = [one.tips[-1] for _, one, _ in running]
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):  # what is no number any more is let go of
             left = run(tips, [inputs for _, _, inputs in running], kinds, settings)
@@ -209,7 +226,7 @@ class Reckoners:
         more = Series(np.array([at]), np.array([place]))
         told = replace(known.told, pictured=known.told.pictured.with_more(more))
         tips = untouched(known.tips, at)
-        return replace(self, by_aircraft={**self.by_aircraft, aircraft: Reckoner(told, tips)})
+        return replace(self, by_aircraft={**self.by_aircraft, aircraft: replace(known, told=told, tips=tips)})
 
 
 def _parts(names: Sequence[str], suspects: Sequence[str], at: int) -> list[tuple[int, tuple[str, ...]]]:

@@ -102,7 +102,7 @@ def _through(tip: Tip, told: Block, kinds: Kinds, cell: int, unit: Unit, setting
     has_place = np.flatnonzero(~np.isnan(told.place[:, 0]))
     if len(has_place):
         # of copters and boats what goes on without GPS is not sure enough: it denied good positions of real ones
-        tells_walks = (kinds.wings | kinds.wheels)[has_place]
+        tells_walks = ((kinds.wings | kinds.wheels) & kinds.unit)[has_place]
         some = judged(tip.taken(has_place), told.place[has_place], told.place_late[has_place], tells_walks, settings)
         tip = tip.put(has_place, some)
     is_pictured = np.flatnonzero(~np.isnan(told.pictured[:, 0]))
@@ -111,6 +111,9 @@ def _through(tip: Tip, told: Block, kinds: Kinds, cell: int, unit: Unit, setting
     stands = np.flatnonzero(kinds.wings & (told.airspeed <= SLOWEST_AIR_MPS))
     if len(stands):  # wheels and ground do what wings do not: what went on without GPS knows nothing of that
         tip = tip.put(stands, split_anew(tip.taken(stands), end))
+    unseen = stands[~kinds.unit[stands]]
+    if len(unseen):  # no unit tells how it takes off, or is thrown: it denies nothing until it has flown for a while
+        tip = tip.put(unseen, replace(some := tip.taken(unseen), began=some.cell))
     if end % SEEDED_EVERY == 0:
         which = 1 + end // SEEDED_EVERY % (HYPOTHESES - 1)
         seeded = tip.seeded.copy()

@@ -30,29 +30,31 @@ _LOOSE_M = 1e6
 
 @dataclass(frozen=True, slots=True)
 class Kinds:
-    """What n vehicles are (n,): with wheels, with a keel, with wings."""
+    """What n vehicles are (n,): with wheels, with a keel, with wings; and whether an inertial unit tells of them."""
 
     wheels: Bools
     hull: Bools
     wings: Bools
+    unit: Bools
 
     @classmethod
-    def of(cls, types: Sequence[int | None]) -> Kinds:
-        """By MAV_TYPE."""
+    def of(cls, types: Sequence[int | None], units: Sequence[bool] | None = None) -> Kinds:
+        """By MAV_TYPE; `units`: of which an inertial unit tells, None: of all."""
         return cls(
             np.array([one in _WHEELS for one in types], np.bool_),
             np.array([one in _HULLS for one in types], np.bool_),
-            np.array([one in _WINGS for one in types], np.bool_),
+            np.array([one in WINGS for one in types], np.bool_),
+            np.array([True] * len(types) if units is None else units, np.bool_),
         )
 
     def taken(self, rows: Ints) -> Kinds:
         """Some of the vehicles."""
-        return Kinds(self.wheels[rows], self.hull[rows], self.wings[rows])
+        return Kinds(self.wheels[rows], self.hull[rows], self.wings[rows], self.unit[rows])
 
 
 _WHEELS = frozenset((10,))  # ground rover
 _HULLS = frozenset((11,))  # surface boat
-_WINGS = frozenset((1, 19, 20, 21, 22, 23, 24, 25, 28))  # fixed wing, VTOL, parafoil
+WINGS = frozenset((1, 19, 20, 21, 22, 23, 24, 25, 28))  # fixed wing, VTOL, parafoil
 
 
 def tied(state: Reckoning, told: Block, kinds: Kinds, cell: int, settings: DeadReckoning) -> Reckoning:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -69,6 +69,7 @@ class Told:
     series: tuple[Series, ...] = tuple(Series.empty(width) for width in WIDTHS)
     places: Series = Series.empty(PLACE)
     pictured: Series = Series.empty(PLACE)  # where the radar had it
+    noise: Floats | None = None  # (6,) of force and rate in a root Hz, where no unit told these; None: one did
 
     def with_more(self, told: Mapping[int, Series]) -> Told:
         """The same with what came since."""
@@ -78,7 +79,7 @@ class Told:
     def since(self, at: int) -> Told:
         """The same without what was before an instant."""
         series = tuple(one.since(at) for one in self.series)
-        return Told(series, self.places.since(at), self.pictured.since(at))
+        return replace(self, series=series, places=self.places.since(at), pictured=self.pictured.since(at))
 
     @property
     def inertial(self) -> Series:
@@ -116,14 +117,20 @@ def before(observations: Iterable[Observation], until: int) -> tuple[list[Observ
     return earlier, later
 
 
-def tells_inertial(observations: Iterable[Observation]) -> set[str]:
-    """Who tells of an inertial unit."""
+def tells_motion(observations: Iterable[Observation], winged: Container[str]) -> set[str]:
+    """Who tells of an inertial unit; and who, with wings, of the airspeed."""
     names = set[str]()
     for one in observations:
         if isinstance(one, Many):
             if one.kind is ImuSample and one.columns.keys() >= _UNIT:
                 names.update(one.columns["aircraft"].tolist())
-        elif isinstance(one, ImuSample) and one.acceleration_mps2 is not None and one.angular_rate_radps is not None:
+            elif "airspeed_mps" in one.columns:
+                known = ~np.isnan(one.columns["airspeed_mps"])
+                names.update(name for name in one.columns["aircraft"][known].tolist() if name in winged)
+        elif isinstance(one, ImuSample):
+            if one.acceleration_mps2 is not None and one.angular_rate_radps is not None:
+                names.add(one.aircraft)
+        elif isinstance(one, AirData) and one.airspeed_mps is not None and one.aircraft in winged:
             names.add(one.aircraft)
     return names
 

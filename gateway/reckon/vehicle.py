@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gateway.reckon.cells import BLOCK, CELL_NS, SECOND, SECOND_CELLS, covered_until, first_covered
+from gateway.reckon.flying import lacks_unit, with_flight
 from gateway.reckon.running import begun
 from gateway.reckon.tip import Tip
 from gateway.reckon.told import ATTITUDE, INERTIAL, Series, Told
@@ -27,6 +28,7 @@ class Reckoner:
 
     told: Told = Told()
     tips: tuple[Tip, ...] = ()
+    by_flight: bool = False  # no unit tells how it moves: its attitude and its airspeed do
 
     @property
     def tip(self) -> Tip | None:
@@ -34,12 +36,13 @@ class Reckoner:
         return self.tips[-1] if self.tips else None
 
 
-def with_portion(told: Told, portion: Mapping[int, Series]) -> tuple[Told, int]:
+def with_portion(one: Reckoner, portion: Mapping[int, Series]) -> tuple[Told, int]:
     """What was told with what came since, and from when on that changes anything."""
-    told, since = told.with_more(portion), 1 << 62
+    told, since = one.told.with_more(portion), 1 << 62
+    lines = (INERTIAL, ATTITUDE) if one.by_flight else (INERTIAL,)
     for kind, series in portion.items():
         first = int(series.at[0])
-        if kind == INERTIAL:  # the line to it begins at the sample before
+        if kind in lines:  # the line to it begins at the sample before
             at = told.series[kind].at
             first = int(at[max(int(np.searchsorted(at, first)) - 1, 0)])
         since = min(since, first)
@@ -51,15 +54,23 @@ def untouched(tips: tuple[Tip, ...], since: int) -> tuple[Tip, ...]:
     return tips[:1] + tuple(tip for tip in tips[1:] if int(tip.cell[0]) * CELL_NS <= since)
 
 
-def begun_or_kept(one: Reckoner, since: int, at: int, settings: DeadReckoning) -> Reckoner:
+def moving(one: Reckoner, has_wings: bool) -> tuple[Reckoner, Told]:
+    """A vehicle, by its flight where it has wings and no unit tells of it; and what it told, that of such a unit included."""
+    by_flight = has_wings and lacks_unit(one.told)
+    if by_flight != one.by_flight:
+        one = replace(one, tips=(), by_flight=by_flight)
+    return one, with_flight(one.told) if by_flight else one.told
+
+
+def begun_or_kept(one: Reckoner, told: Told, since: int, at: int, settings: DeadReckoning) -> Reckoner:
     """A vehicle's tips as far as they still hold; the first one, where dead reckoning can begin."""
     tips = untouched(one.tips, since)
     if tips:
-        end = covered_until(one.told, int(tips[-1].cell[0]))
+        end = covered_until(told, int(tips[-1].cell[0]))
         if at - end * CELL_NS > SILENT_NS:  # for so long what is missing may still come
             tips = ()
     if not tips:
-        first = first_tip(one.told, settings)
+        first = first_tip(told, settings)
         tips = () if first is None else (first,)
     return replace(one, tips=tips)
 
@@ -91,4 +102,4 @@ def pruned(one: Reckoner, oldest: int, settings: DeadReckoning) -> Reckoner:
         variance = tips[-1].state.covariance[0, 0, (0, 1), (0, 1)]
         if not variance.max() <= settings.ends_at_sigma_m**2:  # also what is no number
             tips = ()
-    return Reckoner(one.told.since(oldest - MARGIN_NS), tips)
+    return replace(one, told=one.told.since(oldest - MARGIN_NS), tips=tips)

@@ -13,18 +13,23 @@ import numpy as np
 import pytest
 
 from gateway.frames import RadarFrame, RunwayFrame, polar_from_xyz
-from gateway.observation import GpsReport, Heard, ImuSample, Many, Observation, RadarPlot
+from gateway.observation import Heard, ImuSample, Many, RadarPlot
 from gateway.picture import Picture
-from gateway.pipeline import State, initial, step
-from gateway.settings import DeadReckoning, Options, RadarSite, Runway, Site
-from sim.inertial import aeroplane, car
-from sim.told_rides import Falsified, Teller, heard, honest
-
-SECOND = 1_000_000_000
-START = 1_700_000_000 * SECOND
-SITE = Site("here", Runway(math.radians(47.4), math.radians(8.5), 500.0, 0.0, geoid_separation_m=0.0))
-FALSE_FROM_S = 36.0
-QUIET = Options(horizons_s=(10.0,), prediction_period_s=60.0)  # nothing here is about predictions
+from gateway.settings import DeadReckoning, RadarSite
+from sim.told_pictures import (
+    FALSE_FROM_S,
+    QUIET,
+    SECOND,
+    SITE,
+    START,
+    denials,
+    errors_m,
+    frozen,
+    goes_away,
+    pictures,
+    told,
+)
+from sim.told_rides import Falsified, Teller, honest
 
 
 def walks_off(time_s: float) -> tuple[float, float, float, float]:
@@ -44,31 +49,6 @@ def jumps(time_s: float) -> tuple[float, float, float, float]:
     return (30.0, 40.0, 0.0, 0.0) if FALSE_FROM_S < time_s <= FALSE_FROM_S + 20.0 else (0.0, 0.0, 0.0, 0.0)
 
 
-def goes_away(time_s: float) -> tuple[float, float, float, float] | None:
-    """Nothing for twenty seconds."""
-    return None if FALSE_FROM_S < time_s <= FALSE_FROM_S + 20.0 else (0.0, 0.0, 0.0, 0.0)
-
-
-@cache
-def told(kind: str, falsified: Falsified, length_s: float = 66.0) -> tuple[Teller, tuple[Heard, ...]]:
-    generator = np.random.default_rng([7, kind == "car"])
-    make, vehicle_type = (car, 10) if kind == "car" else (aeroplane, 1)
-    teller = Teller.of("mavlink:1", vehicle_type, make(generator, length_s), generator, falsified)
-    return teller, tuple(heard([teller], START, 5))
-
-
-def pictures(
-    said: Iterable[Heard], at_once: int = 10, options: Options = QUIET, site: Site = SITE
-) -> Iterator[tuple[State, Picture]]:
-    state, waiting = initial(site, options), list[Heard]()
-    for one in said:
-        waiting.append(one)
-        if len(waiting) == at_once:
-            state, picture = step(state, waiting)
-            waiting = []
-            yield state, picture
-
-
 @cache
 def ran(kind: str, falsified: Falsified, dead_reckoning: Literal["on", "off"] = "on") -> tuple[Picture, ...]:
     """A ride, seen through to its end."""
@@ -76,37 +56,9 @@ def ran(kind: str, falsified: Falsified, dead_reckoning: Literal["on", "off"] = 
     return tuple(picture for _, picture in pictures(told(kind, falsified)[1], options=options))
 
 
-def denials(some: Iterable[Picture]) -> list[tuple[float, str]]:
-    """When positions were denied, or believed again, s since they are false."""
-    found = []
-    for picture in some:
-        for event in picture.events:
-            if "what it says of its position" in event.text:
-                word = "believed" if "agrees again" in event.text else "denied"
-                found.append(((event.at - START) / SECOND - FALSE_FROM_S, word))
-    return found
-
-
 def refused(some: Sequence[Picture]) -> int:
     (gateway,) = (one for one in some[-1].health.sources if one.kind == "pipeline")
     return dict(gateway.counters).get("GPS reports that inertial data deny", 0)
-
-
-def errors_m(teller: Teller, some: Iterable[Picture]) -> list[tuple[float, str, float, float]]:
-    """Of each row: when, what it is by, how far it is from the truth, level, and its own sigma."""
-    motion, found = teller.ride.motion, []
-    for picture in some:
-        fuse = picture.fuse
-        for row, time in enumerate(fuse.time.tolist()):
-            time_s = (time - START) / SECOND
-            place = min(round(time_s * 50.0), len(motion.height_m) - 1)
-            north = (fuse.latitude_rad[row] - motion.latitude_rad[place]) * 6.367e6
-            east = (
-                (fuse.longitude_rad[row] - motion.longitude_rad[place]) * 6.388e6 * math.cos(motion.latitude_rad[place])
-            )
-            sigma = math.sqrt(0.5 * (fuse.covariance[row, 0] + fuse.covariance[row, 7]))
-            found.append((time_s - FALSE_FROM_S, fuse.updated_by[row], math.hypot(north, east), sigma))
-    return found
 
 
 @pytest.mark.parametrize(
@@ -132,25 +84,12 @@ def test_a_position_that_freezes_beside_a_radar_is_not_believed() -> None:
     radar = RadarSite(1, 100.0, 100.0, 3.0, 0.0, range_sigma_m=10.0)
     site = replace(SITE, radars=(radar,))
     teller, said = told("aeroplane", honest)
-    heard_together = sorted([*frozen(said), *plots(teller, radar)], key=lambda one: one.now)
+    heard_together = sorted([*frozen(said, FALSE_FROM_S), *plots(teller, radar)], key=lambda one: one.now)
     some = [picture for _, picture in pictures(heard_together, site=site)]
     assert [word for _, word in denials(some)] == ["denied"]
     late = [(by, off) for since_s, by, off, _ in errors_m(teller, some) if since_s > 3.0]
     assert {by for by, _ in late} == {"radar"}
     assert max(off for _, off in late) < 40.0
-
-
-def frozen(said: Iterable[Heard]) -> Iterator[Heard]:
-    """The same, with positions that stay the first one that is false."""
-    first: GpsReport | None = None
-    for one in said:
-        made = list[Observation]()
-        for each in one.observations:
-            if isinstance(each, GpsReport) and one.now > START + FALSE_FROM_S * SECOND:
-                first = first or each
-                each = replace(first, valid_at=each.valid_at, received_at=each.received_at)
-            made.append(each)
-        yield replace(one, observations=tuple(made))
 
 
 def plots(teller: Teller, radar: RadarSite) -> Iterator[Heard]:
@@ -254,8 +193,8 @@ def test_what_is_told_late_goes_back_to_its_place() -> None:
     assert a.velocity_mps == pytest.approx(b.velocity_mps, abs=1e-9)
 
 
-def test_a_vehicle_without_an_inertial_unit_is_nothing_to_dead_reckoning() -> None:
-    _, said = told("aeroplane", goes_away)
+def test_a_car_without_an_inertial_unit_is_nothing_to_dead_reckoning() -> None:
+    _, said = told("car", goes_away)
     plain = [replace(one, observations=tuple(o for o in one.observations if not isinstance(o, Many))) for one in said]
     *_, (state, _) = pictures(plain[:200])
     assert not state.reckoners.by_aircraft

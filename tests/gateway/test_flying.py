@@ -1,0 +1,114 @@
+"""Dead reckoning of vehicles with wings that tell attitude and airspeed, and of no inertial unit or of too little."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from gateway.estimators import inertial as ins
+from gateway.observation import AirData, Attitude, Heard, ImuSample, Many, Observation
+from gateway.picture import Picture
+from gateway.reckon.flying import flown
+from gateway.reckon.told import Series
+from sim.told_pictures import FALSE_FROM_S, QUIET, SECOND, START, denials, errors_m, frozen, goes_away, pictures, told
+from sim.told_rides import honest
+
+
+def by_radio(said: Iterable[Heard], samples_hz: int = 0) -> tuple[Heard, ...]:
+    """What of it comes over a slow telemetry radio: attitude and airspeed three times a second, of the unit a sample or none."""
+    kept = []
+    for tenth, one in enumerate(said):
+        mine = list[Observation]()
+        for each in one.observations:
+            if isinstance(each, Many):
+                if samples_hz and tenth % (10 // samples_hz) == 0:
+                    mine.append(Many(ImuSample, {name: column[:1] for name, column in each.columns.items()}))
+            elif not isinstance(each, Attitude | AirData) or tenth % 3 == 0:
+                mine.append(each)
+        kept.append(replace(one, observations=tuple(mine)))
+    return tuple(kept)
+
+
+@cache
+def flew(samples_hz: int) -> tuple[Picture, ...]:
+    """A flight that has no positions for twenty seconds, of which a unit tells so many samples a second."""
+    return tuple(picture for _, picture in pictures(by_radio(told("aeroplane", goes_away)[1], samples_hz)))
+
+
+@pytest.mark.parametrize("samples_hz", [0, 2])
+def test_attitude_and_airspeed_carry_a_track_on(samples_hz: int) -> None:
+    """Twenty seconds without positions, a turn among them: inside three sigma, and much nearer than a constant velocity."""
+    teller, _ = told("aeroplane", goes_away)
+    rows = [row for row in errors_m(teller, flew(samples_hz)) if row[1] == "dead-reckoning"]
+    assert 16 <= len(rows) <= 19
+    assert all(off < 3.0 * sigma * math.sqrt(2.0) for _, _, off, sigma in rows)
+    motion, begin = teller.ride.motion, round(FALSE_FROM_S * 50)
+    gone = int(rows[-1][0] * 50)
+    straight = motion.velocity_mps[begin, :2] * (gone / 50.0)
+    here = ins.Motion(
+        *(np.asarray(getattr(motion, name)[begin]) for name in ("latitude_rad", "longitude_rad", "height_m")),
+        np.zeros(3),
+        np.zeros(4),
+    )
+    there = (motion.latitude_rad[begin + gone], motion.longitude_rad[begin + gone], motion.height_m[begin + gone])
+    constant_m = math.hypot(*(ins.between(*there, here)[:2] - straight))
+    assert rows[-1][2] < constant_m / 3.0
+
+
+def test_its_good_positions_are_not_refused_and_no_track_is_changed_by_it() -> None:
+    said = by_radio(told("aeroplane", honest)[1])
+    on, off = (
+        [picture for _, picture in pictures(said, options=options)]
+        for options in (QUIET, replace(QUIET, dead_reckoning="off"))
+    )
+    assert not denials(on)
+    assert [one.fuse.covariance.tobytes() for one in on] == [one.fuse.covariance.tobytes() for one in off]
+
+
+def test_a_position_that_freezes_while_it_flies_is_refused_and_the_track_goes_on() -> None:
+    teller, said = told("aeroplane", honest)
+    some = [picture for _, picture in pictures(frozen(by_radio(said), FALSE_FROM_S + 10.0))]
+    (since_s, word) = denials(some)[0]
+    assert word == "denied"
+    assert 10.0 < since_s <= 12.0
+    assert max(off for since_s, _, off, _ in errors_m(teller, some) if 10.0 < since_s < 30.0) < 60.0
+
+
+def test_what_comes_in_other_portions_changes_no_bit() -> None:
+    said = [one for one in by_radio(told("aeroplane", goes_away)[1]) if one.now < START + 41 * SECOND]
+    end = Heard(START + 42 * SECOND)
+
+    def rows(at_once: int) -> bytes:
+        made = [picture.fuse for _, picture in pictures([*said, *[end] * (at_once - len(said) % at_once)], at_once)]
+        return b"".join(np.concatenate([getattr(one, name) for one in made]).tobytes() for name in _COLUMNS)
+
+    assert rows(37) == rows(7)
+
+
+_COLUMNS = ("time", "latitude_rad", "longitude_rad", "velocity_mps", "covariance")
+
+
+def test_what_a_unit_would_tell_of_a_level_turn_is_one() -> None:
+    """30 m/s at 45 degrees of bank for 18 s, its attitude told once a second: the circle closes within 0.2 % of its length."""
+    speed, bank = 30.0, math.radians(45.0)
+    turning = 9.806_65 * math.tan(bank) / speed
+    lasts_s = 2.0 * math.pi / turning
+    seconds = np.linspace(0.0, lasts_s, 20)
+    at = np.round(seconds * SECOND).astype(np.int64)
+    lies = ins.from_angles(bank, 0.0, turning * seconds)
+    unit = flown(Series(at, lies), Series(at, np.full((20, 1), speed)))
+    motion = ins.Motion(
+        np.zeros(1), np.zeros(1), np.zeros(1), np.array([[speed, 0.0, 0.0]]), ins.from_angles([bank], [0.0], [0.0])
+    )
+    for before, sample, after in zip(unit.at, unit.values, unit.at[1:], strict=False):
+        step_s = (after - before) / SECOND
+        motion = ins.advanced(motion, sample[None, 3:6], sample[None, :3], np.array([step_s]), harmful=False)
+    origin = ins.Motion(np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((1, 3)), np.zeros((1, 4)))
+    off = ins.between(motion.latitude_rad, motion.longitude_rad, motion.height_m, origin)[0]
+    assert math.hypot(*off[:2]) < 0.002 * speed * lasts_s
+    assert np.linalg.norm(unit.values[:, :3], axis=1) == pytest.approx(9.806_65 / math.cos(bank), rel=1e-6)
