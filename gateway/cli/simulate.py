@@ -26,7 +26,7 @@ Play a simulated world onto the real wires: aircraft as MAVLink, radars as landi
 A scene is a TOML file: one that comes along ([bold]--list[/] names them) or one of your own (docs/scenes.md);
 [bold]--show[/] prints one to begin with. The scene [bold]radar[/] is a landing radar that watches the aircraft of a
 recording or of a live link. The scene [bold]vehicle[/] is a vehicle that ground stations talk to: it takes missions,
-modes and commands, and flies.
+modes and commands, and flies. The scene [bold]helmsman[/] is an autopilot that steers a simulated ship on a link.
 
 Examples:
 
@@ -47,7 +47,10 @@ Examples:
   talkdown simulate vehicle --type copter --home 47.397,8.546,490 --mavlink udpout:127.0.0.1:14550
 
   talkdown simulate vehicle --mission route.plan --wind 8,270,1.5 --archive flights
+
+  talkdown simulate helmsman --mavlink udpin:0.0.0.0:14560 --set autopilot=expert
 """
+_NO_FILES = ("radar", "vehicle", "helmsman")  # scenes that are commands of their own
 
 
 def register(app: typer.Typer) -> None:
@@ -59,7 +62,9 @@ def simulate(
     scene: Annotated[
         str | None,
         typer.Argument(
-            metavar="[SCENE]", help="A scene's name, a scene file, or radar; a folder for --list.", show_default=False
+            metavar="[SCENE]",
+            help="A scene's name, a scene file, radar, vehicle or helmsman; a folder for --list.",
+            show_default=False,
         ),
     ] = None,
     site: take.SiteOption = None,
@@ -109,9 +114,12 @@ def simulate(
     if scene is None:
         raise UsageError("Which scene? talkdown simulate --list names them; or give a scene file of your own.")
     if shown:
+        if scene in _NO_FILES:
+            raise UsageError(f"The scene {scene} has no file to show; talkdown simulate --help says what it takes.")
         show_scene(scene)
         return
     pace = read_speed(speed, 1.0)
+    _check_belonging(scene, wanted, watch, settings or [], archive)
     if scene == "helmsman":
         from gateway.cli.helmsman import steer_a_ship
 
@@ -120,13 +128,6 @@ def simulate(
     if scene == "vehicle":
         simulate_vehicles(wanted, site, mavlink, seed=seed or 0, speed=pace, archive=archive, quiet=quiet)
         return
-    if wanted != Wanted():
-        raise UsageError(
-            "--type, --mission, --home, --count, --wind, --start and --seconds belong to the scene vehicle: "
-            "talkdown simulate vehicle."
-        )
-    if (scene == "radar") != (watch is not None):
-        raise UsageError("--watch belongs to the scene radar: talkdown simulate radar --watch FILE|URL.")
     if watch is not None:
         from gateway.cli.watching import watch_and_send
 
@@ -139,6 +140,21 @@ def simulate(
         _write(built, archive, quiet)
     else:
         _send(built, mavlink, radar, pace, quiet)
+
+
+def _check_belonging(scene: str, wanted: Wanted, watch: str | None, settings: list[str], archive: Path | None) -> None:
+    """Raises UsageError for an option that the scene would not heed."""
+    if wanted != Wanted() and scene != "vehicle":
+        raise UsageError(
+            "--type, --mission, --home, --count, --wind, --start and --seconds belong to the scene vehicle: "
+            "talkdown simulate vehicle."
+        )
+    if (scene == "radar") != (watch is not None):
+        raise UsageError("--watch belongs to the scene radar: talkdown simulate radar --watch FILE|URL.")
+    if settings and scene == "vehicle":
+        raise UsageError("--set does not change a simulated vehicle; stations set its parameters over the link.")
+    if archive is not None and scene == "helmsman":
+        raise UsageError("A helmsman steers over a link and writes no session; leave --archive out.")
 
 
 def _build(name: str, site: Path | None, seed: int | None, settings: list[str]) -> Scene:

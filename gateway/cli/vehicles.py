@@ -42,6 +42,8 @@ def simulate_vehicles(
     place = take.read_place(site)
     items, home = _items_and_home(wanted, place)
     start_ns = time.time_ns() // 4000 * 4000
+    if wanted.seconds is not None and not wanted.seconds > 0.0:
+        raise UsageError(f"--seconds {wanted.seconds:g} is not above 0.")
     if archive is not None and not items:
         raise UsageError("--archive flies a mission to its end: give one with --mission FILE.")
     fleet = _fleet(wanted, items, home, seed)
@@ -75,7 +77,7 @@ def _items_and_home(wanted: Wanted, place: Place | None) -> tuple[tuple[MissionI
         latitude, longitude, altitude, heading = _numbers(
             wanted.home, "--home", (None, None, ground_m - separation, 0.0)
         )
-        if abs(latitude) > 90.0 or abs(longitude) > 180.0:
+        if not (abs(latitude) < 89.0 and abs(longitude) <= 180.0):
             raise UsageError(f"--home {wanted.home!r} is no place: write latitude and longitude in degrees.")
         where = (math.radians(latitude), math.radians(longitude))
         heading_rad = math.radians(heading) if wanted.home.count(",") == 3 else _first_course(items, *where)
@@ -135,6 +137,8 @@ def _maker(wanted: Wanted) -> Callable[..., Vehicle]:
     from sim.vehicles.flying import HELICOPTER, QUADROTOR, aeroplane, rotorcraft
 
     if wanted.kind is VehicleType.ship:
+        if wanted.wind is not None:
+            raise UsageError("--wind is not for ships; leave it out.")
         return vessel
     wind = _wind(wanted.wind)
     if wanted.kind is VehicleType.plane:

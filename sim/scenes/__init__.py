@@ -14,8 +14,6 @@ from sim.scenes.reading import parse_scene, read_scene
 from sim.scenes.script import Script
 from sim.scenes.staging import stage
 
-RESERVED = "radar"  # `simulate radar` is the radar that watches a recording or a link
-
 _SHIPPED = Path(__file__).parent
 _MISSIONS = (".plan", ".waypoints")
 _FLIGHT = """\
@@ -46,7 +44,8 @@ autopilot = true
 
 def scenes_in(folder: Path) -> tuple[Path, ...]:
     """The scene files of a folder: every .toml that has a table [scene]."""
-    return tuple(path for path in sorted(folder.glob("*.toml")) if "[scene]" in path.read_text("utf-8", "replace"))
+    files = (path for path in sorted(folder.glob("*.toml")) if path.is_file())
+    return tuple(path for path in files if "[scene]" in path.read_text("utf-8", "replace"))
 
 
 def scene_names() -> tuple[str, ...]:
@@ -94,7 +93,6 @@ def build_scene(
 
 
 __all__ = [
-    "RESERVED",
     "OverrideError",
     "SceneParameters",
     "Script",
