@@ -5,14 +5,14 @@ This is the one place where we act as the ground station that commands a vehicle
 
 from __future__ import annotations
 
-import select
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from adapters.mavlink_frames import FrameEncoder, FrameScanner, parse
+from adapters.mavlink_frames import FrameEncoder
 from adapters.mission_upload import MissionUpload
 from adapters.mission_writing import MissionItem
+from gateway.runtime.conversing import Conversation, wait
 from gateway.runtime.links import Link, open_link
 from gateway.runtime.manners import COMPONENT, STATION_HEARTBEAT, SYSTEMS
 from gateway.runtime.urls import LinkError, Url
@@ -49,32 +49,18 @@ def upload_mission(
 
 
 def _carry_out(link: Link, upload: MissionUpload, progress: Callable[[float], None]) -> MissionUpload:
-    encoder = FrameEncoder(SYSTEMS[0], COMPONENT)
-    scanners: dict[str, FrameScanner] = {}
-    peers: dict[str, None] = {}  # all that were heard on it, in order
+    encoder, conversation = FrameEncoder(SYSTEMS[0], COMPONENT), Conversation(link)
     heartbeat_due, its_peer = 0, None
     while not upload.is_done and upload.failure is None:
+        wait([link], _WAIT_S)
         now = time.monotonic_ns()
-        link.tend(time.time_ns())
-        number = link.fileno()
-        if number is None:
-            time.sleep(_WAIT_S)
-        else:
-            select.select([number], [], [], _WAIT_S)
-        chunks = link.receive()
-        for data, peer in zip(chunks.data, chunks.peers, strict=True):
-            peers.setdefault(peer)
-            scanner = scanners.setdefault(peer, FrameScanner())
-            frames = scanner.feed_datagram(data) if chunks.stream is None else scanner.feed(data)
-            for one in frames:
-                frame = parse(one)
-                if frame is not None and frame.verdict == "good":
-                    upload.hear(frame, now)
+        for peer, frame in conversation.hear(now):
+            upload.hear(frame, now)
             if its_peer is None and upload.vehicle is not None:
                 its_peer = peer
-        if peers and now >= heartbeat_due:
+        if conversation.heard_at and now >= heartbeat_due:
             heartbeat_due = now + round(_HEARTBEAT_S * 1e9)
-            _send(link, encoder, "HEARTBEAT", STATION_HEARTBEAT, its_peer or next(iter(peers)))
+            _send(link, encoder, "HEARTBEAT", STATION_HEARTBEAT, its_peer or next(iter(conversation.heard_at)))
         for name, values in upload.due(now):
             _send(link, encoder, name, values, its_peer)
         progress(upload.share)

@@ -75,9 +75,7 @@ class Helmsman:
     _arrived: bool = False
 
     def hear(self, frame: Frame, now_ns: int) -> list[Ask]:
-        """One frame of the link; what to answer, without whom it is for. `now_ns` counts the mission's time-outs."""
-        if frame.verdict != "good":
-            return []
+        """One good frame of the link; what to answer, without whom it is for. `now_ns` counts the mission's time-outs."""
         if frame.message == HEARTBEAT:
             return self._hear_heartbeat(frame, now_ns)
         if frame.system != self.ship:

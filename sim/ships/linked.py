@@ -16,8 +16,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from adapters.mavlink_frames import Frame, FrameEncoder, FrameScanner, fields, parse
+from adapters.mavlink_frames import Frame, FrameEncoder, fields
+from gateway.runtime.conversing import Conversation, wait
 from gateway.runtime.links import Link
+from gateway.runtime.manners import STATION_HEARTBEAT
 from sim.ships.helmsman import FULL, Helmsman
 from sim.ships.vessel import Vessel
 from sim.vehicles.serving import LinkedVehicles
@@ -25,10 +27,8 @@ from sim.vehicles.speaking import Speaker
 
 CONTROL, _read_control = fields("MANUAL_CONTROL", "y", "z", "target")
 STATION, COMPONENT = 253, 191  # the helmsman's: no ground station's number, MAV_COMP_ID_ONBOARD_COMPUTER
-_HEARTBEAT = {
-    "type": 18, "autopilot": 8, "base_mode": 0, "custom_mode": 0, "system_status": 4, "mavlink_version": 3,
-}  # fmt: skip
-_HEARTBEAT_S, _ANSWER_S, _NAP_S = 1.0, 1.0, 0.0005
+_ONBOARD = 18  # MAV_TYPE_ONBOARD_CONTROLLER
+_HEARTBEAT_S, _ANSWER_S, _LONGEST_WAIT_S = 1.0, 1.0, 0.02
 _UNSTEERED_S = 0.01  # of ours, for each step of a ship that nobody steers yet
 
 
@@ -58,30 +58,23 @@ def steer(
     tell: Callable[[str], None] = lambda text: None,
 ) -> None:
     """Steer whatever ship is on a link until her mission is done, or asked to stop. `tell` is given what people should know."""
-    encoder, scanners = FrameEncoder(STATION, COMPONENT), dict[str, FrameScanner]()
+    encoder, conversation = FrameEncoder(STATION, COMPONENT), Conversation(link)
     said_at, told = -_HEARTBEAT_S, 0
     while not helmsman.is_done and not asked_to_stop():
-        now, chunks = time.monotonic_ns(), link.receive()
-        peers = list(scanners) if link.url.scheme == "udpin" else [None]
-        for peer, data in zip(chunks.peers, chunks.data, strict=True):
-            scanner = scanners.setdefault(peer, FrameScanner())
-            for raw in scanner.feed_datagram(data) if chunks.stream is None else scanner.feed(data):
-                frame = parse(raw)
-                for name, values in [] if frame is None else helmsman.hear(frame, now):
-                    link.send(encoder.encode(name, **values), peer)
+        wait([link], _LONGEST_WAIT_S)
+        now = time.monotonic_ns()
+        for peer, frame in conversation.hear(now):
+            for name, values in helmsman.hear(frame, now):
+                link.send(encoder.encode(name, **values), peer)
         asks = helmsman.due(now)
         if now / 1e9 - said_at >= _HEARTBEAT_S:
             said_at = now / 1e9
-            asks.append(("HEARTBEAT", _HEARTBEAT))
+            asks.append(("HEARTBEAT", STATION_HEARTBEAT | {"type": _ONBOARD}))
         for name, values in asks:
-            for one in peers:
-                link.send(encoder.encode(name, **values), one)
+            conversation.tell(encoder.encode(name, **values))
         for note in helmsman.notes[told:]:
             tell(note)
         told = len(helmsman.notes)
-        link.tend(now)
-        if not chunks.data:
-            time.sleep(_NAP_S)
 
 
 def sail_in_step(vessel: Vessel, linked: LinkedVehicles, until_s: float) -> list[tuple[float, float, float]]:

@@ -6,12 +6,11 @@ second (too many vehicles, too high a speed), the vehicles' time runs slower tha
 
 from __future__ import annotations
 
-import select
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from adapters.mavlink_frames import FrameScanner, parse
+from gateway.runtime.conversing import Conversation, wait
 from gateway.runtime.links import Link
 from sim.vehicles.flying import STEP_S
 from sim.vehicles.motion import Vehicle
@@ -29,31 +28,22 @@ class LinkedVehicles:
     link: Link
     speakers: Sequence[Speaker]
     sent: int = 0
-    _scanners: dict[str, FrameScanner] = field(default_factory=dict)
-    _heard_at: dict[str, int] = field(default_factory=dict)
+    _conversation: Conversation = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._conversation = Conversation(self.link)
 
     def send(self, frames: list[bytes]) -> None:
-        """To whoever is there; a link that calls, or a byte stream, has its one peer."""
-        peers: list[str | None] = list(self._heard_at) if self.link.url.scheme == "udpin" else [None]
+        """To whoever is there."""
         for frame in frames:
-            for peer in peers:
-                self.sent += self.link.send(frame, peer)
+            self.sent += self._conversation.tell(frame)
 
     def listen(self, now: int) -> None:
         """Take in what stations say, and answer."""
-        self.link.tend(now)
-        chunks = self.link.receive()
-        for peer, data in zip(chunks.peers, chunks.data, strict=True):
-            scanner = self._scanners.setdefault(peer, FrameScanner())
-            self._heard_at[peer] = now
-            found = scanner.feed_datagram(data) if chunks.stream is None else scanner.feed(data)
-            for raw in found:
-                frame = parse(raw)
-                if frame is not None and frame.verdict == "good":
-                    for speaker in self.speakers:
-                        self.send(speaker.hear(frame, now))
-        for peer in [one for one, at in self._heard_at.items() if now - at > _QUIET_PEER_NS]:
-            del self._heard_at[peer], self._scanners[peer]
+        for _, frame in self._conversation.hear(now):
+            for speaker in self.speakers:
+                self.send(speaker.hear(frame, now))
+        self._conversation.forget(now - _QUIET_PEER_NS)
 
 
 def serve(
@@ -87,7 +77,7 @@ def serve(
             for level, text in linked.link.news:
                 tell(f"{level}: {text}")
             linked.link.news.clear()
-        _wait(links, min((STEP_S - behind_s) / speed, _LONGEST_WAIT_S))
+        wait([linked.link for linked in links], min((STEP_S - behind_s) / speed, _LONGEST_WAIT_S))
 
 
 def _voices(vehicle: Vehicle, links: Sequence[LinkedVehicles]) -> list[tuple[LinkedVehicles, Speaker]]:
@@ -99,14 +89,3 @@ def _fly_to(vehicle: Vehicle, voices: list[tuple[LinkedVehicles, Speaker]], time
         vehicle.step()
         for linked, speaker in voices:
             linked.send(speaker.say(time.monotonic_ns()))
-
-
-def _wait(links: Sequence[LinkedVehicles], seconds: float) -> None:
-    """Until somebody speaks, or it is time. A link that cannot be waited on is asked at every turn."""
-    if seconds <= 0.0:
-        return
-    open_ones = [number for linked in links if (number := linked.link.fileno()) is not None]
-    if open_ones:
-        select.select(open_ones, [], [], seconds)
-    else:
-        time.sleep(seconds)
