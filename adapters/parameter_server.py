@@ -23,7 +23,6 @@ SET, _read_set = fields("PARAM_SET", "param_value", "target_system", "target_com
 TRAFFIC = frozenset((REQUEST_LIST, REQUEST_READ, SET))
 
 _REAL32 = 9
-_NO_INDEX = 65535
 
 
 def hear_parameters(
@@ -56,7 +55,7 @@ def _value(settings: Mapping[str, float], names: list[str], name: str) -> dict[s
         "param_value": settings[name],
         "param_type": _REAL32,
         "param_count": len(names),
-        "param_index": names.index(name) if name in names else _NO_INDEX,
+        "param_index": names.index(name),
     }
 
 

@@ -34,13 +34,12 @@ _TICKS = 5
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One way to draw: its name, points (n, 2) m, colour, width in points of the screen, and whether its price is drawn."""
+    """One way to draw: its name, points (n, 2) m, colour, and width in points of the screen."""
 
     name: str
     curve_m: Floats
     colour: style.Colour
     width: float = 3.0
-    is_priced: bool = True
 
 
 @dataclass(frozen=True, slots=True)

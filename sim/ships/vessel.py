@@ -42,7 +42,7 @@ from sim.vehicles.motion import (
     SetMode,
     Vector,
 )
-from sim.vehicles.piloting import ACCEPTED
+from sim.vehicles.piloting import ACCEPTED, senseless
 from sim.vehicles.steering import Plane, Spot, bearing_rad, distance_m
 
 Floats = NDArray[np.float64]
@@ -54,7 +54,7 @@ _WAYPOINT_RADIUS_M = 30.0
 
 @dataclass
 class Vessel:
-    """One ship. `settings` are parameters by ArduPilot's names; `notes` what she has to say to people and has not said yet."""
+    """One ship. `settings` are parameters by ArduPilot's names; `notes` what she has had to say to people."""
 
     home: Home
     hull: Hull
@@ -113,10 +113,10 @@ class Vessel:
                 return Answer("unsupported", f"there is no mode {order.name}")
             self._enter(order.name)
         elif isinstance(order, ChangeSpeed):
-            if not 0.0 < order.speed_mps < math.inf:
-                return Answer("denied", "a speed is above 0 m/s")
-            self.settings["CRUISE_SPEED"] = order.speed_mps
+            return self._change_speed(order.speed_mps)
         elif isinstance(order, GoTo):
+            if why := senseless(order):
+                return Answer("denied", why)
             self._goal = self.plane.spot(order.latitude_rad, order.longitude_rad, self.home.height_m)
             self._enter("GUIDED")
         elif isinstance(order, GoToItem):
@@ -163,7 +163,7 @@ class Vessel:
             place, ground = (self._ship.east_m, self._ship.north_m), ground_velocity(self._ship, self.weather)
             steered = self._memory.heading(heading)
             wanted, self._along = wanted_heading(self.control, route, self._along, place, steered, ground, self.step_s)
-            self._say_progress(route, float(wanted))
+            self._say_progress(route)
         if self.mode == "MANUAL":
             return self._ordered
         if wanted is None:
@@ -238,12 +238,18 @@ class Vessel:
             self.mode, self._route, self._leg_of = mode, None, (-1, "")
             self._ordered, self.throttle = np.zeros(()), 0.0
 
+    def _change_speed(self, speed_mps: float) -> Answer:
+        if not 0.0 < speed_mps < math.inf:
+            return Answer("denied", "a speed is above 0 m/s")
+        self.settings["CRUISE_SPEED"] = speed_mps
+        return ACCEPTED
+
     def _do(self, items: list[MissionItem]) -> None:
         for item in items:
-            if item.command == CHANGE_SPEED and item.parameters[1] > 0.0:
-                self.settings["CRUISE_SPEED"] = item.parameters[1]
+            if item.command == CHANGE_SPEED:
+                self._change_speed(item.parameters[1])
 
-    def _say_progress(self, route: Route, wanted_rad: float) -> None:
+    def _say_progress(self, route: Route) -> None:
         off = deviation(route, np.zeros((), np.int64), self._ship.east_m, self._ship.north_m)
         end = route.points_m[1]
         here = Spot(float(self._ship.north_m), float(self._ship.east_m), 0.0)
@@ -255,7 +261,6 @@ class Vessel:
             float(off.right_m),
             0.0,
             speed_error,
-            (0.0, 0.0, wanted_rad),
         )
 
     def _measured(self) -> tuple[Floats, Floats]:

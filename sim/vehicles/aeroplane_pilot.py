@@ -14,7 +14,7 @@ from sim.vehicles.energy import hold_energy
 from sim.vehicles.missions import DELAY, LOITER_TIME, LOITER_TURNS, LOITER_UNLIMITED, RETURN_HOME
 from sim.vehicles.motion import Answer, GoAround, GoTo, TakeOff
 from sim.vehicles.piloting import ACCEPTED, DECIDES_EVERY_S, Pilot
-from sim.vehicles.steering import Leg, OnLeg, Spot, bearing_rad, circle, distance_m, follow, height_on, place_on
+from sim.vehicles.steering import Leg, OnLeg, Spot, circle, distance_m, follow, height_on, place_on
 
 _IN_CIRCLE_M = 30.0  # so near to it a circle counts as begun
 _REACHED_HEIGHT_M = 3.0
@@ -29,21 +29,20 @@ _MODES = {"MANUAL": 0, "AUTO": 10, "RTL": 11, "LOITER": 12, "TAKEOFF": 13, "GUID
 
 @dataclass
 class AeroplanePilot(Pilot[Controls]):
-    """One aeroplane's. `goes_around`: how often it breaks off a landing by itself, at `decision_m` above the ground."""
+    """One aeroplane's. `goes_around`: how often it breaks off a landing by itself, 30 m above the ground."""
 
     aeroplane: Aeroplane = field(kw_only=True)
     goes_around: int = field(default=0, kw_only=True)
-    decision_m: float = field(default=_DECISION_M, kw_only=True)
     mode: str = "MANUAL"
     _leg: Leg | None = None
     _climbs_to_m: float | None = None  # going around
     _flares: bool = False
     _centre: Spot | None = None  # of the circle in GUIDED and LOITER
     _radius_m: float = 0.0
-    _bearing_rad: float | None = None  # from a circle's centre, at the decision before
 
     speed_setting: ClassVar[str] = "AIRSPEED_CRUISE"
     modes: ClassVar[dict[str, int]] = _MODES
+    by_hand: ClassVar[str] = "MANUAL"
 
     @property
     def is_landed(self) -> bool:
@@ -60,22 +59,15 @@ class AeroplanePilot(Pilot[Controls]):
             return self._leave_ground(self._hold().height_m)
         return self._circle(self._hold(), self._radius_m or self._own_radius())
 
-    def enter(self, mode: str) -> Answer:
-        """Change the mode: by hand only on the ground, everything else needs an armed vehicle to do something."""
-        if mode == "MANUAL" and not self.is_landed:
-            return Answer("denied", "nobody would fly it by hand")
-        if mode == "AUTO" and len(self.mission.items) < 2:
-            return Answer("denied", "there is no mission")
-        if mode == "AUTO" and self.mission.is_complete:
-            self.mission.restart()
-        self.mode, self._begun, self._climbs_to_m = mode, None, None
+    def _settle(self, mode: str) -> None:
+        """A circle, about home or where it is."""
+        self._climbs_to_m = None
         height = self.home.height_m + self.settings["RTL_ALTITUDE" if mode == "RTL" else "TKOFF_ALT"]
         if mode == "RTL":
             self._centre, self._radius_m = Spot(0.0, 0.0, height), 0.0
         else:
             north, east, now = self.here
             self._centre, self._radius_m = Spot(north, east, height if self.is_landed else now), 0.0
-        return ACCEPTED
 
     def take(self, order: TakeOff | GoTo | GoAround) -> Answer:
         """Take off straight ahead and circle; circle about a place; break off a landing."""
@@ -127,7 +119,7 @@ class AeroplanePilot(Pilot[Controls]):
         if self._leg is not None and not self.is_landed and distance_m(self._leg.end, here) < self._near_m:
             north, east, _ = self._leg.end
             start = Spot(north, east, here.height_m)
-        self._leg, self._bearing_rad, self._flares = Leg(start, end), None, False
+        self._leg, self._flares = Leg(start, end), False
         if item.command == LAND:
             self.aeroplane.ground_m = end.height_m
 
@@ -178,15 +170,12 @@ class AeroplanePilot(Pilot[Controls]):
             radius = self._own_radius()
         centre = self.spot(item)
         if item.command == DELAY and self._leg is not None:
-            centre = self._leg.start._replace(height_m=self._leg.start.height_m)
+            centre = self._leg.start
         controls = self._circle(centre, radius)
         is_in = abs(distance_m(self.here, centre) - abs(radius)) < max(_IN_CIRCLE_M, 0.2 * abs(radius))
         if is_in:
             self._waits_s += DECIDES_EVERY_S
-            bearing = bearing_rad(centre, self.here)
-            if self._bearing_rad is not None:
-                self._turned_rad += abs(math.remainder(bearing - self._bearing_rad, 2.0 * math.pi))
-            self._bearing_rad = bearing
+            self._count_turn(centre)
         amount = item.parameters[0]
         is_over = {
             LOITER_TURNS: self._turned_rad >= 2.0 * math.pi * amount,
@@ -205,11 +194,6 @@ class AeroplanePilot(Pilot[Controls]):
         self._tell(centre, -math.copysign(outside, radius_m), self._speed_error())
         return hold_energy(self.aeroplane, centre.height_m, 0.0, self._cruise(), self._bank(pull))
 
-    def _go_home(self, item: MissionItem) -> Controls:
-        self._reach()
-        self.enter("RTL")
-        return self.decide()
-
     def _land(self, item: MissionItem) -> Controls:
         """Down the leg to the place of landing, flare, and brake to a standstill on its line."""
         leg = self._leg
@@ -219,7 +203,7 @@ class AeroplanePilot(Pilot[Controls]):
         if self.is_landed:
             return self._roll_out(pull)
         above, speed = self.here.height_m - leg.end.height_m, self._ground_speed()
-        if self.goes_around > 0 and above <= self.decision_m:
+        if self.goes_around > 0 and above <= _DECISION_M:
             self.goes_around -= 1
             return self._climb_out(self._go_around(item, None))
         height, climb = height_on(leg, on, speed)
@@ -242,7 +226,7 @@ class AeroplanePilot(Pilot[Controls]):
 
     def _go_around(self, item: MissionItem, height_m: float | None) -> float:
         """The height to which it climbs."""
-        self._climbs_to_m = self.spot(item).height_m + (height_m if height_m else max(_CLIMBS_OUT_M, self.decision_m))
+        self._climbs_to_m = self.spot(item).height_m + (height_m or _CLIMBS_OUT_M)
         self.notes.append("Going around")
         return self._climbs_to_m
 
@@ -283,6 +267,6 @@ class AeroplanePilot(Pilot[Controls]):
     _WAYS: ClassVar[dict[int, Callable[[AeroplanePilot, MissionItem], Controls]]] = {
         TAKE_OFF: _take_off,
         LAND: _land,
-        RETURN_HOME: _go_home,
+        RETURN_HOME: Pilot._go_home,
         **dict.fromkeys((LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE, DELAY), _fly_circle),
     }

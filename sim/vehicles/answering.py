@@ -19,6 +19,7 @@ from adapters.mavlink_frames import Frame, fields, message_name
 from adapters.mission_server import MissionServer, Said, Station
 from adapters.mission_writing import ABOVE_HOME, ABOVE_SEA
 from adapters.rate_client import REQUEST_MESSAGE, SET_MESSAGE_INTERVAL
+from sim.vehicles.missions import TAKEN
 from sim.vehicles.motion import Answer, Arm, ChangeSpeed, GoAround, GoTo, GoToItem, Order, SetMode, TakeOff, Vehicle
 from sim.vehicles.telling import DEFAULT_HZ, STREAMS, Teller
 
@@ -32,10 +33,6 @@ TARGET, _read_target = fields(
     "SET_POSITION_TARGET_GLOBAL_INT", "lat_int", "lon_int", "alt", "type_mask", *_TO, "coordinate_frame"
 )
 HEARD = frozenset((LONG, INT, SET_MODE, DATA_STREAM, TARGET)) | mission_server.TRAFFIC | parameter_server.TRAFFIC
-
-NAVIGATION_COMMANDS = frozenset((16, 17, 18, 19, 20, 21, 22, 31, 82, 93))
-MISSION_COMMANDS = NAVIGATION_COMMANDS | frozenset((112, 177, 178, 179, 181, 183, 189, 201, 203, 205, 206, 530))
-"""What a mission may hold: what is flown, and what others do on the way (a camera, a servo), which is passed over."""
 
 LIMITS = {
     "AIRSPEED_CRUISE": (10.0, 140.0),
@@ -57,9 +54,8 @@ LIMITS = {
 _RESULTS = {"accepted": 0, "denied": 2, "unsupported": 3}
 _NO_POSITION, _CUSTOM, _ABOVE_SEA_INT = 0x7, 1, 5
 _ALL_STREAMS, _FORCED, _NOTICE = 0, 21196.0, 5
-_CAPABILITIES = (
-    0x1 | 0x2 | 0x4 | 0x8 | 0x100 | 0x2000
-)  # missions, floats, item_int, command_int, global targets, MAVLink 2
+# missions, floats, item_int, command_int, global targets, MAVLink 2
+_CAPABILITIES = 0x1 | 0x2 | 0x4 | 0x8 | 0x100 | 0x2000
 _VERSION = 4 << 24 | 5 << 16 | 255  # as an ArduPilot 4.5 release tells it
 
 
@@ -77,7 +73,7 @@ class Answerer:
 
     system: int
     teller: Teller
-    missions: MissionServer = field(default_factory=lambda: MissionServer(MISSION_COMMANDS))
+    missions: MissionServer = field(default_factory=lambda: MissionServer(TAKEN))
     _notes_told: int = 0
 
     @property

@@ -8,12 +8,29 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from adapters.mission_writing import LANDING_SEQUENCE, MissionItem
+from adapters.mission_writing import (
+    CHANGE_SPEED,
+    LAND,
+    LANDING_SEQUENCE,
+    LOITER_TO_ALTITUDE,
+    TAKE_OFF,
+    WAYPOINT,
+    MissionItem,
+)
 
 LAST_NAVIGATION = 95
 LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME = 17, 18, 19
 RETURN_HOME, SPLINE, DELAY = 20, 82, 93
-JUMP, DO_SET_HOME = 177, 179
+JUMP = 177
+TAKEN = frozenset(
+    (
+        *(WAYPOINT, SPLINE, TAKE_OFF, LAND, RETURN_HOME, DELAY),
+        *(LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE),
+        *(JUMP, CHANGE_SPEED, LANDING_SEQUENCE),
+        *(112, 179, 181, 183, 201, 203, 205, 206, 530),  # what others do on the way, a camera, a servo: passed over
+    )
+)
+"""What a mission may hold."""
 _JUMPS_IN_A_ROW = 100  # jumps that only lead to jumps would never end
 
 

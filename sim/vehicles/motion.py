@@ -46,7 +46,6 @@ class Progress(NamedTuple):
     cross_track_m: float | None = None  # to the right of the wanted way
     height_error_m: float | None = None  # wanted less actual
     speed_error_mps: float | None = None  # wanted less actual
-    wanted_attitude_rad: Vector = (0.0, 0.0, 0.0)  # roll, pitch, yaw
 
 
 class Arm(NamedTuple):

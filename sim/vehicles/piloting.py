@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Generic, TypeVar
 
 from adapters.mission_writing import ABOVE_SEA, CHANGE_SPEED, MissionItem
-from sim.vehicles.body import Body
+from sim.vehicles.body import Body, wrapped
 from sim.vehicles.missions import Mission
 from sim.vehicles.motion import (
     Answer,
@@ -49,10 +49,12 @@ class Pilot(ABC, Generic[C]):
     _begun: tuple[int, MissionItem] | None = None  # the item that is being flown
     _waits_s: float = 0.0
     _turned_rad: float = 0.0
+    _bearing_rad: float | None = None  # from a circle's centre, at the decision before
 
     speed_setting: ClassVar[str]  # the parameter that DO_CHANGE_SPEED changes
     speed_unit_mps: ClassVar[float] = 1.0
     modes: ClassVar[dict[str, int]]  # ArduPilot's number of each mode
+    by_hand: ClassVar[str]  # the one of them in which a person flies
 
     def __post_init__(self) -> None:
         self.plane = Plane.about(self.home)
@@ -66,9 +68,21 @@ class Pilot(ABC, Generic[C]):
     def decide(self) -> C:
         """The controls for the next tenth of a second."""
 
-    @abstractmethod
     def enter(self, mode: str) -> Answer:
-        """Change to a mode of `modes`, if that can be."""
+        """Change to a mode of `modes`: by hand only on the ground; a mission that is complete begins anew."""
+        if mode == self.by_hand and not self.is_landed:
+            return Answer("denied", "nobody would fly it by hand")
+        if mode == "AUTO" and len(self.mission.items) < 2:
+            return Answer("denied", "there is no mission")
+        if mode == "AUTO" and self.mission.is_complete:
+            self.mission.restart()
+        self.mode, self._begun = mode, None
+        self._settle(mode)
+        return ACCEPTED
+
+    @abstractmethod
+    def _settle(self, mode: str) -> None:
+        """Where a mode that has just been entered leads to."""
 
     def order(self, order: Order) -> Answer:
         """Do as told; what a vehicle cannot do is unsupported."""
@@ -87,7 +101,7 @@ class Pilot(ABC, Generic[C]):
             self._do(to_do)
             self._begun = None
             return ACCEPTED
-        why = _senseless(order)
+        why = senseless(order)
         return Answer("denied", why) if why else self.take(order)
 
     @abstractmethod
@@ -98,11 +112,6 @@ class Pilot(ABC, Generic[C]):
     def here(self) -> Spot:
         """Where the vehicle is."""
         return self.plane.of(self.body)
-
-    @property
-    def home_spot(self) -> Spot:
-        """Home on its own plane."""
-        return Spot(0.0, 0.0, self.home.height_m)
 
     def spot(self, item: MissionItem) -> Spot:
         """Where an item leads; one without a place: here. Terrain is level here, and as high as home."""
@@ -139,7 +148,8 @@ class Pilot(ABC, Generic[C]):
         if item is None:
             return None
         if self._begun is None or self._begun[0] != self.mission.current or self._begun[1] is not item:
-            self._begun, self._waits_s, self._turned_rad = (self.mission.current, item), 0.0, 0.0
+            self._begun = (self.mission.current, item)
+            self._waits_s, self._turned_rad, self._bearing_rad = 0.0, 0.0, None
             self._begin(item)
         return item
 
@@ -153,10 +163,23 @@ class Pilot(ABC, Generic[C]):
         self._do(self.mission.reach())
         self._begun = None
 
+    def _go_home(self, item: MissionItem) -> C:
+        """An item that asks for it."""
+        self._reach()
+        self.enter("RTL")
+        return self.decide()
+
+    def _count_turn(self, centre: Spot) -> None:
+        """How far it has gone round a place since the decision before."""
+        bearing = bearing_rad(centre, self.here)
+        if self._bearing_rad is not None:
+            self._turned_rad += abs(wrapped(bearing - self._bearing_rad))
+        self._bearing_rad = bearing
+
     def _do(self, items: list[MissionItem]) -> None:
         """Commands of the mission that are no places."""
         for item in items:
-            if item.command == CHANGE_SPEED and item.parameters[1] > 0.0:
+            if item.command == CHANGE_SPEED:  # -1 leaves the speed as it is, and is none
                 self._change_speed(item.parameters[1])
 
     def _tell(self, target: Spot, cross_track_m: float | None, speed_error_mps: float | None) -> None:
@@ -167,7 +190,7 @@ class Pilot(ABC, Generic[C]):
         self.progress = Progress(away, towards, cross_track_m, above, speed_error_mps)
 
 
-def _senseless(order: TakeOff | GoTo | GoAround) -> str:
+def senseless(order: TakeOff | GoTo | GoAround) -> str:
     """Why an order can be nobody's intention; empty for one that can."""
     height = order.height_m
     if isinstance(order, GoTo):

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from adapters.mission_writing import LAND, LOITER_TO_ALTITUDE, TAKE_OFF, MissionItem
+from adapters.mission_writing import LAND, LOITER_TO_ALTITUDE, TAKE_OFF, WAYPOINT, MissionItem
 from sim.earth import GRAVITY_MPS2
 from sim.vehicles.body import wrapped
-from sim.vehicles.missions import DELAY, LOITER_TIME, LOITER_TURNS, LOITER_UNLIMITED, RETURN_HOME
+from sim.vehicles.missions import DELAY, LOITER_TIME, LOITER_TURNS, LOITER_UNLIMITED, RETURN_HOME, SPLINE
 from sim.vehicles.motion import Answer, GoAround, GoTo, TakeOff
 from sim.vehicles.piloting import ACCEPTED, DECIDES_EVERY_S, Pilot
 from sim.vehicles.rotorcraft import Rotorcraft, Thrust
@@ -35,11 +35,11 @@ class RotorcraftPilot(Pilot[Thrust]):
     _goal: Spot | None = None  # in GUIDED, LOITER, RTL and LAND
     _learnt: tuple[float, float] = (0.0, 0.0)  # acceleration that holds it against the wind
     _heading_rad: float = 0.0
-    _bearing_rad: float | None = None
 
     speed_setting: ClassVar[str] = "WPNAV_SPEED"
     speed_unit_mps: ClassVar[float] = 0.01
     modes: ClassVar[dict[str, int]] = _MODES
+    by_hand: ClassVar[str] = "STABILIZE"
 
     @property
     def is_landed(self) -> bool:
@@ -60,22 +60,14 @@ class RotorcraftPilot(Pilot[Thrust]):
             self.mode = "LAND"
         return self._towards(goal)
 
-    def enter(self, mode: str) -> Answer:
-        """Change the mode."""
-        if mode == "STABILIZE" and not self.is_landed:
-            return Answer("denied", "nobody would fly it by hand")
-        if mode == "AUTO" and len(self.mission.items) < 2:
-            return Answer("denied", "there is no mission")
-        if mode == "AUTO" and self.mission.is_complete:
-            self.mission.restart()
-        self.mode, self._begun = mode, None
+    def _settle(self, mode: str) -> None:
+        """Here, or home at a safe height."""
         here = self.here
         self._goal, self._heading_rad = here, self.body.attitude_rad[2]
         if mode == "RTL":
             height = max(here.height_m, self.home.height_m + 0.01 * self.settings["RTL_ALT"])
             self._goal = Spot(0.0, 0.0, height)
         self._leg = Leg(here, self._goal)
-        return ACCEPTED
 
     def take(self, order: TakeOff | GoTo | GoAround) -> Answer:
         """Rise; go to a place and hover there."""
@@ -108,7 +100,7 @@ class RotorcraftPilot(Pilot[Thrust]):
         end, start = self.spot(item), self.here
         if self._leg is not None and distance_m(self._leg.end, start) < 2.0 * self._wp_radius():
             start = self._leg.end._replace(height_m=start.height_m)
-        self._leg, self._bearing_rad = Leg(start, end), None
+        self._leg = Leg(start, end)
         if self._leg.length_m > self._wp_radius():
             self._heading_rad = bearing_rad(start, end)
         if item.command == LAND:
@@ -159,9 +151,7 @@ class RotorcraftPilot(Pilot[Thrust]):
         bearing = bearing_rad(centre, here)
         speed = min(self._cruise(), math.sqrt(0.5 * self.craft.parameters.accelerates_mps2 * abs(radius)))
         if abs(outside) < 0.3 * abs(radius):
-            if self._bearing_rad is not None:
-                self._turned_rad += abs(wrapped(bearing - self._bearing_rad))
-            self._bearing_rad = bearing
+            self._count_turn(centre)
             if self._turned_rad >= 2.0 * math.pi * item.parameters[0]:
                 self._leg = None
                 self._reach()
@@ -172,11 +162,6 @@ class RotorcraftPilot(Pilot[Thrust]):
         velocity = (speed * math.cos(course), speed * math.sin(course))
         ahead = (-inward * math.cos(bearing), -inward * math.sin(bearing))
         return self._thrust(velocity, self._climb_to(centre.height_m, 0.0), ahead)
-
-    def _go_home(self, item: MissionItem) -> Thrust:
-        self._reach()
-        self.enter("RTL")
-        return self.decide()
 
     def _land(self, item: MissionItem) -> Thrust:
         """Over the place first, then straight down."""
@@ -277,11 +262,11 @@ class RotorcraftPilot(Pilot[Thrust]):
     def _cruise(self) -> float:
         return 0.01 * self.settings["WPNAV_SPEED"]
 
-    _PASSING: ClassVar[frozenset[int]] = frozenset((16, 82))
+    _PASSING: ClassVar[frozenset[int]] = frozenset((WAYPOINT, SPLINE))
     _WAYS: ClassVar[dict[int, Callable[[RotorcraftPilot, MissionItem], Thrust]]] = {
         TAKE_OFF: _take_off,
         LAND: _land,
-        RETURN_HOME: _go_home,
+        RETURN_HOME: Pilot._go_home,
         LOITER_TURNS: _fly_circle,
         **dict.fromkeys((DELAY, LOITER_UNLIMITED, LOITER_TIME), _wait),
         LOITER_TO_ALTITUDE: _fly_leg,
