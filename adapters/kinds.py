@@ -18,6 +18,7 @@ from typing import Literal
 from adapters.mavlink_frames import V1, V2, FrameScanner, parse
 from adapters.mission_files import mission_kind
 from adapters.pcap import is_capture
+from adapters.reasons import reason_of
 from adapters.tlog import record_end
 
 Kind = Literal["tlog", "pcap", "pcapng", "BIN", "ulg", "plan", "waypoints", "session"]
@@ -42,7 +43,7 @@ def kind_of(path: Path) -> Kind:
         with path.open("rb") as file:
             beginning = file.read(_BEGINNING)
     except OSError as error:
-        raise FileError(f"{path} cannot be read ({(error.strerror or str(error)).lower()}).") from error
+        raise FileError(f"{path} cannot be read ({reason_of(error)}).") from error
     if not beginning:
         raise FileError(f"{path} is empty.")
     if is_capture(beginning):

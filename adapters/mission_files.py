@@ -29,6 +29,7 @@ from adapters.mission_writing import (
     MissionItem,
 )
 from adapters.plans import plan_point
+from adapters.reasons import reason_of
 from gateway.observation import PlanPoint
 
 MissionKind = Literal["plan", "waypoints"]
@@ -102,7 +103,7 @@ def _read(path: Path) -> tuple[list[_Item], tuple[PlanPoint, ...]]:
             raise MissionFileError(f"{path} is too large to be a mission.")
         content = path.read_bytes()
     except OSError as error:
-        raise MissionFileError(f"{path} cannot be read ({(error.strerror or str(error)).lower()}).") from error
+        raise MissionFileError(f"{path} cannot be read ({reason_of(error)}).") from error
     kind = mission_kind(content)
     if kind is None:
         raise MissionFileError(f"{path} is no mission file: neither QGroundControl's .plan nor QGC WPL 110.")

@@ -39,6 +39,7 @@ from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import all as dialect
 
 from adapters.mavlink_frames import V1, V2
+from adapters.reasons import reason_of
 
 KEY_BYTES = 32
 REFUSED_UNSIGNED, REFUSED_SIGNATURE, REFUSED_REPLAYED, REFUSED_OLD, REFUSED_STREAMS = (
@@ -74,8 +75,7 @@ def read_key(path: Path) -> bytes:
         with path.open("rb") as file:
             content = file.read(_LARGEST_KEY_FILE + 1)
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise SigningKeyError(f"The key file {path} cannot be read: {reason}.") from error
+        raise SigningKeyError(f"The key file {path} cannot be read: {reason_of(error)}.") from error
     key = _key_of(content, path)
     if not any(key):
         raise SigningKeyError(f"The key in {path} is all zeros, which MAVLink takes for no key; make another one.")

@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from adapters.reasons import reason_of
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
 from gateway.cli.many import Crew, failures, names_of, tell_failures, wide_console
@@ -111,7 +112,7 @@ def replay_one(thing: tuple[Path, Path | None], wanted: Wanted) -> dict[str, Any
     except RunFailure as failure:
         raise RunError(str(failure)) from failure
     except OSError as error:
-        raise RunError(f"{target or session}: {(error.strerror or str(error)).lower()}.") from error
+        raise RunError(f"{target or session}: {reason_of(error)}.") from error
     return summary.document()
 
 
@@ -165,8 +166,9 @@ def _targets(sessions: Sequence[Path], archive: Path | None, crew: Crew) -> list
     try:
         archive.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise UsageError(f"{archive} cannot be written to ({reason}); choose another folder for --archive.") from error
+        raise UsageError(
+            f"{archive} cannot be written to ({reason_of(error)}); choose another folder for --archive."
+        ) from error
     inside = archive if crew.scheduler is None else archive.absolute()
     return [inside / name for name in names_of(sessions, lambda name: (inside / name).exists())]
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from gateway.cli import options as take
-from gateway.cli.failures import RunError, UsageError
+from gateway.cli.failures import UsageError, writing
 
 _HELP = """
 Write the messages of a .tlog as Parquet tables, one file a kind of message, to be read by pandas, Polars, DuckDB and the
@@ -48,8 +48,8 @@ def columns(
             raise UsageError(
                 f"{file} is a .{kind}, and columns reads .tlog files: a session's are in its folder inputs."
             )
-        out.mkdir(parents=True, exist_ok=True)
-        with progressing("writing tables", show=not quiet) as tell:
+        with writing(out), progressing("writing tables", show=not quiet) as tell:
+            out.mkdir(parents=True, exist_ok=True)
             rows = write_tables(file, out, message, counters=counters, tell=tell)
     except FileError as error:
         raise UsageError(str(error)) from error
@@ -57,8 +57,6 @@ def columns(
         raise UsageError(
             f"There is no MAVLink message {error.args[0]!r}; names are written as GLOBAL_POSITION_INT."
         ) from error
-    except OSError as error:
-        raise RunError(f"{out} could not be written: {(error.strerror or str(error)).lower()}.") from error
     if not quiet:
         for name, number in rows.items():
             print(f"{number:>10} {name}")

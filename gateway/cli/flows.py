@@ -11,7 +11,7 @@ import typer
 
 from gateway.cli import options as take
 from gateway.cli.arrivals_selected import Selection, document, flown_by, shortcuts, table_of
-from gateway.cli.failures import RunError, UsageError
+from gateway.cli.failures import RunError, UsageError, reading, writing
 from gateway.cli.many import Crew, expanded, failures, tell_failures, wide_console
 from gateway.cli.places import read_place_deg
 from gateway.cli.spread import spread
@@ -130,14 +130,12 @@ def _read(paths: list[Path], crew: Crew, *, show: bool) -> tuple[list[Flight], l
 def flights_one(path: Path) -> list[Flight]:
     """The flights of one file or session. Raises UsageError, RunError."""
     from gateway.runtime.arrivals import ArrivalsError, flights_of
-    from gateway.runtime.folder import FolderError
 
     try:
-        return flights_of(path)
-    except (ArrivalsError, FolderError) as error:
+        with reading(path):
+            return flights_of(path)
+    except ArrivalsError as error:
         raise UsageError(str(error)) from error
-    except OSError as error:
-        raise RunError(f"{path} could not be read: {(error.strerror or str(error)).lower()}.") from error
 
 
 def _archive(
@@ -148,13 +146,11 @@ def _archive(
     from gateway.runtime.flow_ways import write_ways
     from gateway.sinks.flows import draw
 
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         write_flows(tracks, result, folder)
         write_ways(ways_of(result.flows, airport_deg), airport_deg, folder)
         draw(tracks, result, folder / "flows.rrd", () if beside is None else beside.procedures)
-    except OSError as error:
-        raise RunError(f"{folder} could not be written: {(error.strerror or str(error)).lower()}.") from error
 
 
 def _document(

@@ -6,7 +6,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from gateway.cli import options as take
-from gateway.cli.failures import RunError, UsageError
+from gateway.cli.failures import UsageError, sending
 
 if TYPE_CHECKING:
     from sim.ships.helmsman import Helmsman
@@ -31,10 +31,8 @@ def steer_a_ship(url: str, settings: list[str], quiet: bool) -> None:
         print(f"waiting for a ship on {where}; Ctrl-C ends.", flush=True)
     tell = (lambda text: None) if quiet else (lambda text: print(text, file=sys.stderr, flush=True))
     try:
-        with StopSignals() as stop:
+        with sending(), StopSignals() as stop:
             steer(link, helmsman, asked_to_stop=stop, tell=tell)
-    except OSError as error:
-        raise RunError(f"Sending failed: {(error.strerror or str(error)).lower()}.") from error
     finally:
         link.close()
 

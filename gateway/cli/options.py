@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from adapters.reasons import reason_of
 from gateway.cli.failures import UsageError
 
 if TYPE_CHECKING:
@@ -203,7 +204,7 @@ def read_place(path: Path | None) -> Place | None:
     except FileNotFoundError as error:
         raise UsageError(f"There is no site file {path}; `talkdown site` writes one to start from.") from error
     except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"The site file {path} cannot be read: {error}.") from error
+        raise UsageError(f"The site file {path} cannot be read: {reason_of(error)}.") from error
 
 
 def read_keys(place: Place | None, site_path: Path | None) -> dict[int, bytes]:
@@ -216,7 +217,7 @@ def read_keys(place: Place | None, site_path: Path | None) -> dict[int, bytes]:
                 keys[radar.number] = path.read_bytes().strip()
             except OSError as error:
                 raise UsageError(
-                    f"The key file of radar {radar.number}, {path}, cannot be read: {error.strerror}."
+                    f"The key file of radar {radar.number}, {path}, cannot be read: {reason_of(error)}."
                 ) from error
             if not keys[radar.number]:
                 raise UsageError(f"The key file of radar {radar.number}, {path}, is empty.")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gateway.cli import options as take
-from gateway.cli.failures import RunError, UsageError
+from gateway.cli.failures import RunError, UsageError, writing
 from gateway.cli.places import read_place_deg
 
 if TYPE_CHECKING:
@@ -222,12 +222,10 @@ def _write(flight: Flight, wishes: Wishes, speed_mps: float, out: Path) -> list[
 
     items, home = mission(flight, speed_mps)
     paths = [out.with_name(f"{out.name}.{ending}") for ending in ("plan", "waypoints", "rrd")]
-    try:
+    with writing(out):
         paths[0].write_text(format_plan(items, home, cruise_mps=speed_mps, fences=fences(flight)), "utf-8")
         paths[1].write_text(format_waypoints(items, home), "utf-8")
         draw(flight, wishes.lambda_m4, paths[2])
-    except OSError as error:
-        raise RunError(f"{out} could not be written: {(error.strerror or str(error)).lower()}.") from error
     return paths
 
 

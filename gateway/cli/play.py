@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from gateway.cli import options as take
-from gateway.cli.failures import RunError, UsageError
+from gateway.cli.failures import UsageError, sending
 from gateway.cli.replay_options import FilesArgument, FromOption, ToOption, read_speed, seek
 
 _HELP = """
@@ -62,18 +62,17 @@ def play(
         if url.scheme != "udpout":
             raise UsageError(f"play sends, so it needs udpout:HOST:PORT and not {url}.")
     try:
-        playback = open_playback(files)
-        playback, options = seek(playback, Options(), begin, end, None)
-        if not quiet:
-            for note in playback.notes:
-                print(note, file=sys.stderr)
-        with StopSignals() as stop:
-            since = options.begins_at
-            sent = play_onto(playback, mavlink_url, radar_url, speed=pace, begins_at=since, asked_to_stop=stop)
+        with sending():
+            playback = open_playback(files)
+            playback, options = seek(playback, Options(), begin, end, None)
+            if not quiet:
+                for note in playback.notes:
+                    print(note, file=sys.stderr)
+            with StopSignals() as stop:
+                since = options.begins_at
+                sent = play_onto(playback, mavlink_url, radar_url, speed=pace, begins_at=since, asked_to_stop=stop)
     except (FileError, FolderError, LinkError, SeekError) as error:
         raise UsageError(str(error)) from error
-    except OSError as error:
-        raise RunError(f"Sending failed: {(error.strerror or str(error)).lower()}.") from error
     if not quiet:
         to = [f"{number} {kind}" for kind, number in sent.items() if number]
         print(f"sent {' and '.join(to) or 'nothing'}")

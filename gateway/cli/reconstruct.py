@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gateway.cli import options as take
-from gateway.cli.failures import RunError, UsageError
+from gateway.cli.failures import RunError, UsageError, writing
 from gateway.cli.replay_options import FilesArgument, MuteOption
 
 if TYPE_CHECKING:
@@ -217,12 +217,10 @@ def _archive(found: dict[str, list[Sortie]], folder: Path) -> Path:
     from gateway.runtime.flights import write_flights
     from gateway.sinks.flights import draw
 
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         write_flights(found, folder)
         draw(found, folder / "flights.rrd")
-    except OSError as error:
-        raise RunError(f"{folder} could not be written: {(error.strerror or str(error)).lower()}.") from error
     return folder
 
 

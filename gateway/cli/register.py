@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gateway.cli import options as take
-from gateway.cli.failures import RunError, UsageError
+from gateway.cli.failures import RunError, UsageError, writing
 from gateway.cli.replay_options import FilesArgument
 
 if TYPE_CHECKING:
@@ -161,10 +161,8 @@ def _document(result: Result, method: Method) -> dict[str, Any]:
 
 
 def _write(path: Path, content: str) -> None:
-    try:
-        path.write_text(content)
-    except OSError as error:
-        raise RunError(f"{path} could not be written: {(error.strerror or str(error)).lower()}.") from error
+    with writing(path):
+        path.write_text(content, encoding="utf-8")
 
 
 def _show(result: Result) -> None:

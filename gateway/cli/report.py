@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gateway.cli import options as take
-from gateway.cli.failures import RunError, UsageError
+from gateway.cli.failures import UsageError, reading, writing
 from gateway.cli.many import Crew, SessionsArgument, failures, names_of, sessions_of, tell_failures, wide_console
 from gateway.cli.spread import spread
 
@@ -81,16 +81,11 @@ def report(
 def _found(session: Path) -> Reported:
     """The approaches of one session, completed first if it was killed. Raises UsageError, RunError."""
     from gateway.runtime.approaches import approaches_of
-    from gateway.runtime.folder import FolderError
     from gateway.runtime.sessions import mend
 
-    try:
+    with reading(session):
         mend(session)
         return approaches_of(session)
-    except FolderError as error:
-        raise UsageError(str(error)) from error
-    except OSError as error:
-        raise RunError(f"{session} could not be read: {(error.strerror or str(error)).lower()}.") from error
 
 
 def _page(found: Reported) -> str:
@@ -101,10 +96,8 @@ def _page(found: Reported) -> str:
 
 
 def _write(path: Path, text: str) -> None:
-    try:
+    with writing(path):
         path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise RunError(f"{path} could not be written: {(error.strerror or str(error)).lower()}.") from error
 
 
 def _show(number: int, one: Approach) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from gateway.cli import options as take
-from gateway.cli.failures import RunError, UsageError
+from gateway.cli.failures import reading
 from gateway.cli.many import Crew, SessionsArgument, failures, names_of, sessions_of, tell_failures, wide_console
 from gateway.cli.spread import spread
 
@@ -69,17 +69,12 @@ def score(sessions: SessionsArgument, crew: Crew = Crew(), telling: take.Telling
 def score_one(session: Path) -> Scored:
     """The scores of one session, completed first if it was killed. Raises UsageError, RunError."""
     from gateway.offline.score import joined, scores
-    from gateway.runtime.folder import FolderError
     from gateway.runtime.foretold import errors_of
     from gateway.runtime.sessions import mend
 
-    try:
+    with reading(session):
         mend(session)
         parts, against = errors_of(session)
-    except FolderError as error:
-        raise UsageError(str(error)) from error
-    except OSError as error:
-        raise RunError(f"{session} could not be read: {(error.strerror or str(error)).lower()}.") from error
     return Scored(scores(joined(parts)), against)
 
 

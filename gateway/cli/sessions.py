@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from adapters.reasons import reason_of
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
 from gateway.cli.many import Crew, failures, tell_failures, wide_console
@@ -114,7 +115,7 @@ def repair_one(session: Listed) -> Listed:
     except FolderError as error:
         raise RunError(str(error)) from error
     except OSError as error:
-        raise RunError(f"{session.folder}: {(error.strerror or str(error)).lower()}.") from error
+        raise RunError(f"{session.folder}: {reason_of(error)}.") from error
     if mended.faults:
         raise RunError(
             f"{session.folder}: {'; '.join(fault.what for fault in mended.faults)}; it cannot be made again."
@@ -135,7 +136,7 @@ def compact_one(session: Listed) -> Listed | None:
             return None
         done = compact(path)
     except OSError as error:
-        raise RunError(f"{path}: {(error.strerror or str(error)).lower()}.") from error
+        raise RunError(f"{path}: {reason_of(error)}.") from error
     if done is False:
         raise RunError(
             f"{path} could not be compacted: Rerun cannot make sense of it, or the disk is full; it is as it was."
@@ -190,8 +191,8 @@ def _prune(rows: Sequence[Row], oldest: int, order: Order, telling: take.Telling
         except FolderError as error:
             failed.append({"session": str(row.session.folder), "reason": str(error)})
         except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            failed.append({"session": str(row.session.folder), "reason": f"could not be removed: {reason}."})
+            told = f"could not be removed: {reason_of(error)}."
+            failed.append({"session": str(row.session.folder), "reason": told})
     freed = [row.session.size_bytes for row in old if row.removed]
     _tell(f"{len(freed)} sessions removed, {_size(sum(freed))} freed.", telling)
     return failed

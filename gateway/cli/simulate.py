@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gateway.cli import options as take
-from gateway.cli.failures import RunError, UsageError
+from gateway.cli.failures import UsageError, sending, writing
 from gateway.cli.replay_options import read_speed
 from gateway.cli.spread import spread
 from gateway.cli.vehicle_options import Wanted
@@ -180,12 +180,10 @@ def _write(scene: Scene, archive: Path, quiet: bool) -> None:
     from sim.recording import write_session
 
     try:
-        with _Progress(scene.duration_s, quiet) as progress:
+        with writing(archive), _Progress(scene.duration_s, quiet) as progress:
             folder = write_session(scene, archive, command=tuple(sys.argv[1:]), progress=progress)
     except FolderError as error:
         raise UsageError(str(error)) from error
-    except OSError as error:
-        raise RunError(f"{archive} could not be written: {(error.strerror or str(error)).lower()}.") from error
     if not quiet:
         print(f"archived in {folder}")
 
@@ -201,12 +199,10 @@ def _send(scene: Scene, mavlink: str, radar: str, pace: float | None, quiet: boo
             raise UsageError(f"simulate sends, so it needs udpout:HOST:PORT and not {url}.")
     stop = threading.Event()
     try:
-        with StopSignals(stop.set), _Progress(scene.duration_s, quiet) as progress:
+        with sending(), StopSignals(stop.set), _Progress(scene.duration_s, quiet) as progress:
             sent = play(scene, mavlink_url, radar_url, speed=pace, stop=stop, progress=progress)
     except LinkError as error:
         raise UsageError(str(error)) from error
-    except OSError as error:
-        raise RunError(f"Sending failed: {(error.strerror or str(error)).lower()}.") from error
     if not quiet:
         print(f"sent {' and '.join(f'{number} {kind}' for kind, number in sent.items()) or 'nothing'}")
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gateway.cli import options as take
-from gateway.cli.failures import RunError, UsageError
+from gateway.cli.failures import UsageError, sending, writing
 from gateway.cli.vehicle_options import VehicleType, Wanted
 
 if TYPE_CHECKING:
@@ -184,18 +184,17 @@ def _write(
 
     longest = _LONGEST_S if seconds is None else seconds
     try:
-        folder = write_flight(
-            speakers,
-            archive,
-            start_ns,
-            site=None if place is None else place.text,
-            longest_s=longest,
-            command=tuple(sys.argv[1:]),
-        )
+        with writing(archive):
+            folder = write_flight(
+                speakers,
+                archive,
+                start_ns,
+                site=None if place is None else place.text,
+                longest_s=longest,
+                command=tuple(sys.argv[1:]),
+            )
     except FolderError as error:
         raise UsageError(str(error)) from error
-    except OSError as error:
-        raise RunError(f"{archive} could not be written: {(error.strerror or str(error)).lower()}.") from error
     if not quiet:
         for speaker in speakers:
             print(f"mavlink:{speaker.encoder.system} {_came_to(speaker)}")
@@ -241,7 +240,7 @@ def _serve(
                 f"{wanted.kind.value} {numbers} on {', '.join(str(link.url) for link in opened)}; Ctrl-C ends.",
                 flush=True,
             )
-        with StopSignals() as stop:
+        with sending(), StopSignals() as stop:
 
             def is_over() -> bool:
                 is_late = wanted.seconds is not None and vehicles[0].moment.time_s >= wanted.seconds
@@ -251,8 +250,6 @@ def _serve(
             serve(vehicles, links, speed=speed, asked_to_stop=is_over, tell=tell)
     except LinkError as error:
         raise UsageError(str(error)) from error
-    except OSError as error:
-        raise RunError(f"Sending failed: {(error.strerror or str(error)).lower()}.") from error
     finally:
         for link in opened:
             link.close()

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from adapters.reasons import reason_of
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError
 
@@ -46,9 +47,7 @@ def watch_and_send(
     except (FileError, FolderError, LinkError, OverrideError) as error:
         raise UsageError(str(error)) from error
     except OSError as error:
-        raise RunError(
-            f"The radar's datagrams could not be kept or sent: {(error.strerror or str(error)).lower()}."
-        ) from error
+        raise RunError(f"The radar's datagrams could not be kept or sent: {reason_of(error)}.") from error
 
 
 def _watch_recording(

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from adapters.declared import Goal, decode, encode_intent, encode_weather
+from adapters.reasons import reason_of
 from gateway.observation import Intent
 from gateway.runtime.declarable import Known, goal_declared, objection
 from gateway.settings import SiteError, Weather
@@ -66,10 +67,8 @@ class WatchedFile:
         self._seen = self._stamp()
         try:
             return parse_declared(self.path.read_text(encoding="utf-8"), str(self.path))
-        except OSError as error:
-            raise SiteError(f"{self.path} cannot be read: {(error.strerror or str(error)).lower()}.") from error
-        except UnicodeDecodeError as error:
-            raise SiteError(f"{self.path} is no text.") from error
+        except (OSError, UnicodeDecodeError) as error:
+            raise SiteError(f"{self.path} cannot be read: {reason_of(error)}.") from error
 
     def _goals(self, known: Known, notes: list[tuple[str, str]]) -> list[bytes]:
         lines, wanted = [], {goal.aircraft: goal for goal in self._now.goals}

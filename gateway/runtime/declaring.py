@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from adapters.declared import LONGEST_LINE, decode, says_where, sentence
+from adapters.reasons import reason_of
 from gateway.observation import Intent
 from gateway.runtime.declarable import Known, objection
 from gateway.runtime.declared_file import Notes, WatchedFile
@@ -167,9 +168,7 @@ class Declaring:
             try:
                 self.port.write_into(folder)
             except OSError as error:
-                raise RunFailure(
-                    f"{folder} could not be written ({(error.strerror or str(error)).lower()})."
-                ) from error
+                raise RunFailure(f"{folder} could not be written ({reason_of(error)}).") from error
 
     def close(self) -> None:
         """Listen no more."""

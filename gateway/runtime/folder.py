@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from adapters import Kind, Source
+from adapters.reasons import reason_of
 from gateway.predict import ArrivalFlow
 from gateway.register import Remembered
 from gateway.runtime.flow_ways import read_archived
@@ -110,8 +111,9 @@ def make_folder(parent: Path, name: str) -> Path:
             f"{parent} is a file; --archive needs a folder, which is made if it does not exist."
         ) from error
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise FolderError(f"{parent} cannot be written to ({reason}); choose another folder for --archive.") from error
+        raise FolderError(
+            f"{parent} cannot be written to ({reason_of(error)}); choose another folder for --archive."
+        ) from error
     raise FolderError(f"{parent} holds 1000 sessions of this second; choose another folder for --archive.")
 
 

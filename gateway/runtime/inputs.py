@@ -10,6 +10,7 @@ from pathlib import Path
 from adapters import Arrival, Source
 from adapters.files import FileError
 from adapters.pcap import PcapReader
+from adapters.reasons import reason_of
 from adapters.tlog import TlogReader
 from gateway.runtime.commands import read_commands
 
@@ -42,6 +43,6 @@ class SessionInput:
                     for captured in PcapReader(file, self.counters):
                         yield Arrival(captured.received_at, self.source.number, captured.data, captured.sender)
         except OSError as error:
-            raise FileError(f"{self.path} cannot be read ({(error.strerror or str(error)).lower()}).") from error
+            raise FileError(f"{self.path} cannot be read ({reason_of(error)}).") from error
         except ValueError as error:
             raise FileError(f"{self.path} is not what {self.source.name} can have sent ({error}).") from error

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from adapters.files import FileError
+from adapters.reasons import reason_of
 from gateway.runtime.folder import INPUTS, SESSION_FILE, FolderError, Record, read_record
 from gateway.runtime.outputs import RRD_FILE
 from gateway.runtime.sessions import mend, session_folders
@@ -111,7 +112,7 @@ def look(folder: Path) -> Listed:
     except (FolderError, FileError) as error:
         faults.append(Fault(f"it could not be completed: {error}"))
     except OSError as error:
-        faults.append(Fault(f"it could not be completed: {(error.strerror or str(error)).lower()}"))
+        faults.append(Fault(f"it could not be completed: {reason_of(error)}"))
     sizes = _sizes(folder)
     try:
         written_at = (folder / SESSION_FILE).stat().st_mtime_ns

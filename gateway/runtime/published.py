@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from adapters.reasons import reason_of
 from gateway.offline.procedures import Procedure
 from gateway.runtime.arrivals import onto_level
 from gateway.settings.procedures import Published, parse_procedures
@@ -23,7 +24,7 @@ def read_published(path: Path) -> Published:
     except FileNotFoundError as error:
         raise SiteError(f"There is no file {path}; docs/commands.md shows how procedures are written.") from error
     except (OSError, UnicodeDecodeError) as error:
-        raise SiteError(f"{path} cannot be read: {error}.") from error
+        raise SiteError(f"{path} cannot be read: {reason_of(error)}.") from error
 
 
 def procedures_about(

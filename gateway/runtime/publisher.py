@@ -14,6 +14,7 @@ from collections import Counter, deque
 from collections.abc import Callable
 from typing import Any, Protocol
 
+from adapters.reasons import reason_of
 from gateway.runtime.links import resolve
 from gateway.runtime.urls import LinkError, Url
 
@@ -218,5 +219,4 @@ def _why(error: Exception) -> str:
         return "nobody answers; start what should take them first, or correct the address"
     if isinstance(error, ConnectionRefusedError):
         return "nobody listens there; start what should take them first, or correct the address"
-    text = str(getattr(error, "strerror", None) or error).rstrip(".")
-    return f"{text[:1].lower()}{text[1:]}; correct what follows --publish"
+    return f"{reason_of(error)}; correct what follows --publish"

@@ -15,6 +15,7 @@ import numpy as np
 
 from adapters import Arrival, Source
 from adapters.arrivals import Arrivals
+from adapters.reasons import reason_of
 from gateway import __version__
 from gateway.observation import Heard
 from gateway.picture import Picture
@@ -241,8 +242,8 @@ class Run:
 
     def _failure(self, error: OSError) -> RunFailure:
         where = self.folder or error.filename or "the archive"
-        reason = (error.strerror or str(error)).lower()
-        return RunFailure(f"{where} could not be written ({reason}); the session ends here, what was written is whole.")
+        told = f"{where} could not be written ({reason_of(error)}); the session ends here, what was written is whole."
+        return RunFailure(told)
 
     def finish(self, ended: str, tell: Callable[[float], None] = lambda share: None) -> Summary:
         """Smooth, where that was asked for; close everything, make the Parquet files, complete session.json; the summary.

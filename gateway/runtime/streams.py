@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from collections import Counter
 from typing import Any
 
+from adapters.reasons import reason_of
 from gateway.runtime.links import RECEIVE_BUFFER_BYTES, Chunks, addresses
 from gateway.runtime.urls import LinkError, Url
 
@@ -282,5 +283,4 @@ def _reason(error: BaseException) -> str:
         return "nobody answers"
     if isinstance(error, ConnectionRefusedError):
         return "nobody listens there"
-    text = str(getattr(error, "strerror", None) or error)
-    return text[:1].lower() + text[1:].rstrip(".")
+    return reason_of(error)

@@ -14,6 +14,7 @@ from collections import Counter
 
 import numpy as np
 
+from adapters.reasons import reason_of
 from gateway.runtime.batches import SO_RXQ_OVFL, SO_TIMESTAMPNS, Datagrams, batches_of
 from gateway.runtime.drain import Drain
 from gateway.runtime.links import RECEIVE_BUFFER_BYTES, Chunks, resolve
@@ -272,4 +273,4 @@ def _why_not(url: Url, error: OSError) -> str:
         return f"{url}: this port may only be used by the administrator; choose one from 1024 up."
     if error.errno == errno.EADDRNOTAVAIL:
         return f"{url}: this machine has no address {url.host}; listen on 0.0.0.0 for all that it has."
-    return f"{url}: cannot be opened: {(error.strerror or str(error)).lower()}."
+    return f"{url}: cannot be opened: {reason_of(error)}."

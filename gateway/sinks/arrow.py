@@ -20,6 +20,7 @@ from typing import Generic, TypeVar
 
 import pyarrow as pa
 
+from adapters.reasons import reason_of
 from gateway.fuse import Fused
 from gateway.observation import Truth
 from gateway.picture import Picture
@@ -50,7 +51,7 @@ class _Stream:
         except OSError as error:
             self._failed = True
             self._file.truncate(self._length)  # half a batch helps nobody
-            reason = f"the archive could not be written: {error.strerror}"
+            reason = f"the archive could not be written: {reason_of(error)}"
             raise OSError(error.errno, reason, str(self.path)) from error
         self._length += len(memoryview(message))
 

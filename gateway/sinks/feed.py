@@ -17,6 +17,7 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
+from adapters.reasons import reason_of
 from gateway.sinks.scene.entry import Always, Made, Piece, send
 from gateway.sinks.serving import free_port
 
@@ -81,7 +82,7 @@ class FileFeed:
             self._failed = True
             self._file.truncate(whole)
             self._length = whole
-            reason = f"the recording could not be written: {error.strerror}"
+            reason = f"the recording could not be written: {reason_of(error)}"
             raise OSError(error.errno, reason, str(self.path)) from error
 
     def close(self) -> bool:

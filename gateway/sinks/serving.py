@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import socket
 
+from adapters.reasons import reason_of
+
 
 def free_port(host: str, port: int) -> int:
     """The port itself, or a free one for 0; raises OSError when it is taken, which Rerun would only log."""
@@ -13,5 +15,5 @@ def free_port(host: str, port: int) -> int:
         try:
             probe.bind((host, port))
         except OSError as error:
-            raise OSError(error.errno, f"the viewer's server cannot use {host}:{port}: {error.strerror}") from error
+            raise OSError(error.errno, f"the viewer's server cannot use {host}:{port}: {reason_of(error)}") from error
         return int(probe.getsockname()[1])

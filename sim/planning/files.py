@@ -33,6 +33,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adapters.reasons import reason_of
 from gateway.settings import SiteError
 from gateway.settings.reading import check_tables, read_table, read_toml
 from gateway.settings.tables import Convert, Table, number, text
@@ -117,8 +118,7 @@ def read_case(path: Path) -> Case:
             raise SiteError(f"{path} is too large to be a file of threats.")
         written = path.read_text("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
-        raise SiteError(f"{path} cannot be read ({reason.lower()}).") from error
+        raise SiteError(f"{path} cannot be read ({reason_of(error)}).") from error
     return parse_case(written, str(path), path.stem)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from adapters.reasons import reason_of
 from gateway.settings import Site, SiteError
 from gateway.settings.instants import instant_ns
 from gateway.settings.reading import check_tables, hint, line_of, parse_site, read_row, read_site, read_table, read_toml
@@ -27,8 +28,7 @@ def read_scene(path: Path) -> Script:
     try:
         content = path.read_text("utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
-        raise SiteError(f"{path} cannot be read ({reason.lower()}).") from error
+        raise SiteError(f"{path} cannot be read ({reason_of(error)}).") from error
     return parse_scene(content, str(path), path.parent, path.stem)
 
 
