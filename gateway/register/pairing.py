@@ -28,6 +28,7 @@ Bools = NDArray[np.bool_]
 WITHIN_NS = SECOND // 2  # of a report: the plots that count
 WAIT_NS = SECOND // 2 + SECOND  # after a report: what may count beside it; and a radar's clock may be late or early
 FORMER_NS = 20 * SECOND  # a pair that was lost is watched for so long: did it err, or does the radar?
+APART_NS = 4 * SECOND  # of reports that a velocity is made of: the further, the less their errors make of it
 NEAREST_M = 100.0  # nearer than this angles tell little of a radar
 
 
@@ -141,12 +142,24 @@ def _said(plots: Sequence[Plot], at: Sequence[int], owner: NDArray[np.intp]) -> 
 
 
 def _velocities(fixes: Sequence[Fix], state: Association) -> Floats:
-    """What reports say of them, (n, 3); else to the next report of the aircraft that was checked, or from the one before."""
+    """What reports say of them, (n, 3); else by the aircraft's reports before and after, NaN where there are none.
+
+    Not by the report itself: its own error would stand in what the radar is off and in the velocity, and look like lateness.
+    """
     velocity = np.array([fix.velocity_mps for fix in fixes])
     for row in np.flatnonzero(np.isnan(velocity).any(axis=1)).tolist():
         fix, known = fixes[row], state.chosen.get(fixes[row].aircraft, ())
-        place = bisect_left(known, fix.at, key=_at)
-        for other in (known[near] for near in (place - 1, place + 1) if 0 <= near < len(known)):
-            if other.at != fix.at and other.has_height:
-                velocity[row] = (other.enu_m - fix.enu_m) * (SECOND / (other.at - fix.at))
+        first, end = bisect_left(known, fix.at, key=_at), bisect_right(known, fix.at, key=_at)
+        before = [other for other in known[:first] if other.has_height][::-1]
+        after = [other for other in known[end:] if other.has_height]
+        if before and after:
+            span = min(_reach(fix, before), _reach(fix, after))
+            one, other = (min(side, key=lambda near: abs(abs(near.at - fix.at) - span)) for side in (before, after))
+            velocity[row] = (other.enu_m - one.enu_m) * (SECOND / (other.at - one.at))
     return velocity
+
+
+def _reach(fix: Fix, side: Sequence[Fix]) -> int:
+    """How far the last of some reports, the nearest first, is that is not too far; the nearest in any case."""
+    reached = [abs(other.at - fix.at) for other in side]
+    return max((far for far in reached if far <= APART_NS), default=reached[0])

@@ -51,18 +51,40 @@ def test_a_pair_is_of_what_was_measured_whatever_was_taken_off(world: Any, corre
     assert (found.pairs.sigma[0] > 0.0).all()
 
 
-def test_a_report_without_a_velocity_is_carried_along_to_the_next_one(world: Any) -> None:
+def test_a_report_without_a_velocity_is_carried_along_by_those_before_and_after(world: Any) -> None:
     fix, tracks = flown(world, 30.0, (0.0, 0.0, 0.0, 0.0))
     still = replace(fix, velocity_mps=np.full(3, np.nan))
-    later, _ = flown(world, 35.0, (0.0, 0.0, 0.0, 0.0))
+    earlier, later = (flown(world, t_s, (0.0, 0.0, 0.0, 0.0))[0] for t_s in (25.0, 35.0))
     spans, nothing = Spans([Span(KEY, "mavlink:1", 0)]), Ledger()
     check = Check(still, (), frozenset(), nothing, nothing, ())
-    state = Association(Ledger({}, spans), (check,), chosen={"mavlink:1": (still, later)})
+    state = Association(Ledger({}, spans), (check,), chosen={"mavlink:1": (earlier, still, later)})
     found = gathered(state, spans, tracks, world.radars, still.at, still.at + 1)
     assert found is not None
     assert found.pairs.off[0] == pytest.approx(ERROR - found.pairs.rates[0] * LATE_S, rel=1e-3, abs=1e-5)
-    alone = replace(state, chosen={})
-    assert gathered(alone, spans, tracks, world.radars, still.at, still.at + 1) is None
+    for others in ((), (still, later), (earlier, still)):
+        alone = replace(state, chosen={"mavlink:1": others})
+        assert gathered(alone, spans, tracks, world.radars, still.at, still.at + 1) is None
+
+
+def test_the_errors_of_positions_alone_do_not_look_like_lateness(world: Any) -> None:
+    """A velocity that is made of positions has none of the error of the report that it carries: they scatter apart."""
+    random, spans, nothing = np.random.default_rng(3), Spans([Span(KEY, "mavlink:1", 0)]), Ledger()
+    true, tracks = flown(world, 30.0, (0.0, 0.0, 0.0, 0.0), radar_error=False)
+    off, rates = [], []
+    for _ in range(400):
+        fixes = []
+        for second in range(-5, 6):
+            said = world.fix(world.Course(-12e3, 900.0, 900.0, 85.0, 2.0, 0.0), 30.0 + second)
+            noise = random.normal(0.0, 10.0, 3)
+            fixes.append(replace(said, enu_m=said.enu_m + noise, velocity_mps=np.full(3, np.nan)))
+        check = Check(fixes[5], (), frozenset(), nothing, nothing, ())
+        state = Association(Ledger({}, spans), (check,), chosen={"mavlink:1": tuple(fixes)})
+        found = gathered(state, spans, tracks, world.radars, true.at, true.at + 1)
+        assert found is not None
+        off.append(found.pairs.off[0, 0])
+        rates.append(found.pairs.rates[0, 0])
+    assert np.std(rates) < 2.5  # ten metres at eight seconds' distance: 1.8 m/s, not 14
+    assert abs(np.corrcoef(off, rates)[0, 1]) < 0.15  # three sigma of 400; 0.7 if the report's own error is in both
 
 
 def test_a_pair_that_was_lost_lately_is_watched_unless_either_has_another(world: Any) -> None:
