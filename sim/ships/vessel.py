@@ -28,7 +28,7 @@ from sim.ships.voyage import STEP_S
 from sim.ships.waves import Rolling, Waves
 from sim.vehicles.body import Body
 from sim.vehicles.flying import SURFACE_BOAT
-from sim.vehicles.missions import Mission
+from sim.vehicles.missions import RETURN_HOME, Mission
 from sim.vehicles.motion import (
     Answer,
     Arm,
@@ -111,6 +111,10 @@ class Vessel:
         elif isinstance(order, SetMode):
             if order.name not in self.modes:
                 return Answer("unsupported", f"there is no mode {order.name}")
+            if order.name == "AUTO" and len(self.mission.items) < 2:
+                return Answer("denied", "there is no mission")
+            if order.name == "AUTO" and self.mission.is_complete:
+                self.mission.restart()
             self._enter(order.name)
         elif isinstance(order, ChangeSpeed):
             return self._change_speed(order.speed_mps)
@@ -136,7 +140,7 @@ class Vessel:
         """A fifth of a second further."""
         route = self._find_route()
         order = self._steer(route)
-        running = self.is_armed and self.mode != "HOLD"
+        running = self.is_armed and (self.mode == "MANUAL" or route is not None)
         self.throttle = self.throttle if self.mode == "MANUAL" else float(running)
         wanted_mps = self.settings["CRUISE_SPEED"] * self.throttle * running
         before = self._ship.speed_mps
@@ -184,8 +188,11 @@ class Vessel:
             self._leg_of = wanted
             start, end = self._ends()
             points = np.array([[start.east_m, start.north_m], [end.east_m, end.north_m]])
-            self._route = Route(points, self.settings["WP_RADIUS"]) if distance_m(start, end) > 1.0 else None
             self._along = replace(self._along, integral_m=np.zeros(()))
+            if distance_m(start, end) > 1.0:
+                self._route = Route(points, self.settings["WP_RADIUS"])
+            else:
+                self._pass()
         return self._route
 
     def _wanted_leg(self) -> tuple[int, str] | None:
@@ -225,13 +232,17 @@ class Vessel:
         if self.mode in ("GUIDED", "RTL"):
             self._goal = None
             self._enter("HOLD")
-        elif self.mission.item is not None:
+        elif (item := self.mission.item) is not None:
             self.notes.append(f"Reached item {self.mission.current}")
             self._do(self.mission.reach())
-            if self.mission.is_complete and self.mode == "AUTO":
+            if item.command == RETURN_HOME and self.mode == "AUTO":
+                self._enter("RTL")
+            elif self.mission.is_complete and self.mode == "AUTO":
                 self._enter("HOLD")
 
     def _enter(self, mode: str) -> None:
+        if mode not in ("GUIDED", "RTL"):
+            self._goal = None
         if mode == "RTL":
             self._goal = Spot(0.0, 0.0, self.home.height_m)
         if mode != self.mode:
@@ -255,13 +266,8 @@ class Vessel:
         here = Spot(float(self._ship.north_m), float(self._ship.east_m), 0.0)
         there = Spot(float(end[1]), float(end[0]), 0.0)
         speed_error = self.settings["CRUISE_SPEED"] - float(self._ship.speed_mps)
-        self.progress = Progress(
-            distance_m(here, there),
-            bearing_rad(here, there),
-            float(off.right_m),
-            0.0,
-            speed_error,
-        )
+        away, towards = distance_m(here, there), bearing_rad(here, there)
+        self.progress = Progress(away, towards, float(off.right_m), 0.0, speed_error)
 
     def _measured(self) -> tuple[Floats, Floats]:
         if self._sea is None:

@@ -86,6 +86,36 @@ def test_in_manual_whoever_is_at_the_helm_steers_and_is_told_the_cross_track_err
     assert east > 10.0
 
 
+def test_a_mission_that_ends_with_the_return_home_ends_there() -> None:
+    """Two items at one place are both reached; then the way home, and HOLD."""
+    out = _item(400.0, 0.0)
+    ship = vessel(HOME, (out, out, MissionItem(20)))
+    for order in (Arm(True), SetMode("AUTO")):
+        assert ship.order(order).result == "accepted"
+    modes = []
+    while ship.mode != "HOLD" and ship.moment.time_s < 600.0:
+        modes.append(ship.mode)
+        moment = ship.step()
+    assert ship.mission.reached == [1, 2, 3]
+    assert list(dict.fromkeys(modes)) == ["AUTO", "RTL"]
+    home = ship.plane.spot(HOME.latitude_rad, HOME.longitude_rad, 5.0)
+    assert distance_m(ship.plane.spot(moment.latitude_rad, moment.longitude_rad, 5.0), home) < 60.0
+
+
+def test_a_ship_without_a_way_does_not_go() -> None:
+    """No mission, no AUTO; GUIDED without a place leaves the engine stopped; senseless speeds of a mission change nothing."""
+    ship = vessel(HOME)
+    ship.order(Arm(True))
+    assert ship.order(SetMode("AUTO")).why == "there is no mission"
+    assert ship.order(SetMode("GUIDED")).result == "accepted"
+    assert ship.step().throttle == 0.0
+    fast = vessel(HOME, (MissionItem(178, parameters=(0.0, math.inf, 0.0, 0.0)), _item(500.0, 0.0)))
+    for order in (Arm(True), SetMode("AUTO")):
+        fast.order(order)
+    fast.step()
+    assert fast.settings["CRUISE_SPEED"] == fast.hull.speed_mps
+
+
 def test_what_a_ship_cannot_do_is_refused() -> None:
     """She does not take off, has no mode FBWA, no item 7, and no speed of 0 m/s; another speed and a place are taken."""
     ship = _under_way()
@@ -93,6 +123,7 @@ def test_what_a_ship_cannot_do_is_refused() -> None:
     assert ship.order(SetMode("FBWA")).result == "unsupported"
     assert ship.order(GoToItem(7)).result == "denied"
     assert ship.order(ChangeSpeed(0.0)).result == "denied"
+    assert ship.order(GoTo(3.0, HOME.longitude_rad)).why == "that is no place on earth"
     assert ship.order(ChangeSpeed(5.0)).result == "accepted"
     assert ship.order(GoTo(HOME.latitude_rad + 1e-4, HOME.longitude_rad)).result == "accepted"
     assert ship.mode == "GUIDED"
