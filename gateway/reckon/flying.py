@@ -18,11 +18,9 @@ from gateway.reckon.told import AIRSPEED, ATTITUDE, INERTIAL, Series, Told
 
 Floats = NDArray[np.float64]
 
-SECOND = 1_000_000_000
 GRAVITY_MPS2 = 9.806_65
-PAUSE_NS = 1_500_000_000  # between two attitudes: beyond it nobody knows how it turned
-HELD_NS = 2 * SECOND  # an airspeed counts until the next, and for so long at most
-PARTS = 3  # of what is between two attitudes: `cells.GAP_NS` lies between two samples at most
+PAUSE_NS = 2_500_000_000  # between two attitudes: beyond it nobody knows how it turned; and so long an airspeed counts
+PARTS = 6  # of what is between two attitudes: `cells.GAP_NS` lies between two samples at most
 LISTENS_S = 10.0  # before it is said that no unit tells of a vehicle
 FEWEST_HZ = 3.0  # samples of a unit that can be used
 FORCE_NOISE = (1.5, 1.5, 1.5)  # m/s2 in a root Hz, along the body: gusts, thrust, and angles of attack that change
@@ -51,7 +49,7 @@ def flown(attitudes: Series, airspeeds: Series) -> Series:
     begin = np.flatnonzero(np.diff(at) <= PAUSE_NS)
     told = np.searchsorted(airspeeds.at, at[begin], side="right") - 1
     is_known = told >= 0
-    is_known[is_known] = at[begin[is_known]] - airspeeds.at[told[is_known]] <= HELD_NS
+    is_known[is_known] = at[begin[is_known]] - airspeeds.at[told[is_known]] <= PAUSE_NS
     begin, speed = begin[is_known], airspeeds.values[told[is_known], 0]
     lasts_s = (at[begin + 1] - at[begin]) / 1e9
     turned = _rotation(product(attitude[begin] * [1.0, -1.0, -1.0, -1.0], attitude[begin + 1]))

@@ -3,8 +3,8 @@
 python -m sim.studies.real_flight fixed-wing-thor75.mat       (AuraUAS/navigation, MIT)
 
 A small fixed wing, 366 s in the air: an inertial unit at 50 Hz, indicated airspeed, GPS once a second, and the attitude of its
-autopilot. The filter runs once through the flight with GPS; from each tenth second on it goes on without. What is muted is the
-reference: its own errors, 3 m, are in the figures.
+autopilot; all of it, without that attitude, or without the unit. The filter runs once through the flight with GPS; from each
+tenth second on it goes on without. What is muted is the reference: its own errors, 3 m, are in the figures.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from gateway.estimators.inertial import Motion, between, displaced, from_angles
 from gateway.reckon.cells import CELL_NS, SECOND_CELLS, cells, covered_until
+from gateway.reckon.flying import with_flight
 from gateway.reckon.judging import WANDERS_M
 from gateway.reckon.running import run
 from gateway.reckon.ties import Kinds
@@ -31,6 +32,7 @@ Floats = NDArray[np.float64]
 
 START = 1_349_870_249_000_000_000
 BEGINS_S, FLIES_S, LANDS_S = 90.0, 230.0, 565.0
+RADIO_EVERY = 12  # of 50 samples a second
 STATED = (3.0, 5.0, 0.5)  # sigmas of this receiver's positions and velocities
 SETTINGS = DeadReckoning(refuses=False)
 
@@ -55,8 +57,10 @@ class Windows:
         )
 
 
-def flight(path: Path, *, attitude: bool = True) -> Told:
-    """What the aircraft told; without `attitude` only that before it began to fly."""
+def flight(path: Path, *, attitude: bool = True, unit: bool = True) -> Told:
+    """What the aircraft told; without `attitude` only that before it began to fly; without `unit` as a telemetry radio brings
+    it: attitude and airspeed four times a second, and what an inertial unit would have told.
+    """
     from scipy.io import loadmat
 
     told = loadmat(str(path), squeeze_me=True, struct_as_record=False)["flight_data"]
@@ -65,16 +69,20 @@ def flight(path: Path, *, attitude: bool = True) -> Told:
     velocity = np.stack([told.vn, told.ve, told.vd], axis=1)
     place = np.stack([np.radians(told.lat), np.radians(told.lon), told.alt], axis=1)
     sigmas = np.broadcast_to(STATED, (len(at), 3))
-    unit = np.stack([told.ax, told.ay, told.az, told.p, told.q, told.r, np.ones(len(at))], axis=1)
+    samples = np.stack([told.ax, told.ay, told.az, told.p, told.q, told.r, np.ones(len(at))], axis=1)
     known = (told.navValid == 0) & (attitude | (told.time < BEGINS_S + 5.0))
     lying = from_angles(told.phi, told.theta, told.psi)
     series = (
-        Series(at[1:], unit[1:]),
+        Series(at[1:], samples[1:]),
         Series(at[known], lying[known]),
         Series(at, told.ias[:, None]),
         Series.empty(1),
     )
-    return Told(series, Series(at[fresh], np.hstack([place, velocity, sigmas])[fresh]))
+    told = Told(series, Series(at[fresh], np.hstack([place, velocity, sigmas])[fresh]))
+    if unit:
+        return told
+    seldom = tuple(Series(one.at[::RADIO_EVERY], one.values[::RADIO_EVERY]) for one in series)
+    return with_flight(replace(told, series=seldom))
 
 
 def windows(told: Told, length_s: float, every_s: float = 10.0) -> Windows:
@@ -84,7 +92,8 @@ def windows(told: Told, length_s: float, every_s: float = 10.0) -> Windows:
     begin = first_tip(replace(told, places=Series(places.at[:early], places.values[:early])), SETTINGS)
     assert begin is not None
     first = int(begin.cell[0])
-    kinds = Kinds.of([1])
+    has_unit = told.noise is None
+    kinds = Kinds.of([1], [has_unit])
     (passed,) = run([begin], [cells(told, first, covered_until(told, first))], kinds, SETTINGS)
     starts = [
         tip
@@ -95,7 +104,7 @@ def windows(told: Told, length_s: float, every_s: float = 10.0) -> Windows:
     ]
     alone = replace(told, places=Series.empty(PLACE))
     inputs = [cells(alone, int(tip.cell[0]), int(tip.cell[0]) + round(length_s * SECOND_CELLS)) for tip in starts]
-    ways = run(starts, inputs, Kinds.of([1] * len(starts)), SETTINGS)
+    ways = run(starts, inputs, Kinds.of([1] * len(starts), [has_unit] * len(starts)), SETTINGS)
     scored = [[_scored(one, tip, places) for one in way] for tip, way in zip(starts, ways, strict=True)]
     table = np.array(scored)
     return Windows(length_s, table[..., 0], table[..., 1], table[..., 2])
@@ -126,9 +135,13 @@ def _scored(one: Tip, begin: Tip, places: Series) -> tuple[float, float, float]:
 
 def main() -> None:
     """Print what the windows come to."""
-    for attitude in (True, False):
-        told = flight(Path(sys.argv[1]), attitude=attitude)
-        print("with the autopilot's attitude" if attitude else "by the unit alone")
+    for what, attitude, unit in (
+        ("with the autopilot's attitude", True, True),
+        ("by the unit alone", False, True),
+        ("by the autopilot's attitude and airspeed, without the unit", True, False),
+    ):
+        told = flight(Path(sys.argv[1]), attitude=attitude, unit=unit)
+        print(what)
         for length_s in (20.0, 60.0):
             print(f"  {windows(told, length_s).sentence()}")
 
