@@ -101,7 +101,7 @@ class Work(Associating):
         elif turn == Turn.JUDGING:
             self.consistency = self.consistency.planning(at)
         elif turn == Turn.LOOKING:
-            self.probing = self.probing.looking(at, list(self._confirmed()), self.site.separation)
+            self.probing = self.probing.looking(at, list(self._probed()), self.site.separation)
         elif turn == Turn.MEETING:
             self.probing = self.probing.meeting(self.site.separation)
         elif turn == Turn.PROBING:
@@ -277,13 +277,15 @@ class Work(Associating):
             self.events += [Event(at, level, text) for level, text in made.judged.said]
         self.probing = self.probing.hearing(made.ways, at, self.options.prediction_period_s)
 
-    def _confirmed(self) -> dict[int, Lane]:
+    def _probed(self) -> dict[int, Lane]:
         """The tracks that are surely something that flies, by their numbers."""
-        return {lane.number: lane for lane in self._alive() if lane.last.score == fuse.CONFIRMED}
+        # Not the ship that carries the runway: who lands on her comes near her on purpose.
+        some = (lane for lane in self._alive() if self.deck is None or lane.aircraft != self.deck.follows)
+        return {lane.number: lane for lane in some if lane.last.score == fuse.CONFIRMED}
 
     def _probe(self, at: int) -> None:
         """Which tracks will lose their separation."""
-        alive = self._confirmed()
+        alive = self._probed()
         if len(alive) < 2 and not self.probing.watched:
             return
         self.probing, found = self.probing.watching(at, list(alive), self.site.separation)

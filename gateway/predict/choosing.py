@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.align import SECOND
 from gateway.estimators.circling import ON_CIRCLE, Circles
 from gateway.estimators.intent import BELIEVED, USED_IN_TURN_RAD, Belief, Seen, to_turn
 from gateway.estimators.turns_and_straights import or_zero
+from gateway.frames import RunwayFrame
 from gateway.geodesy import wrap_rad
 from gateway.predict.goals import GO_AROUND, RUNWAY
 from gateway.predict.joining import joining
@@ -18,7 +20,7 @@ from gateway.predict.minds import Minds
 from gateway.predict.stacked import Stacked
 from gateway.predict.table import DECLARED, INFERRED, NONE
 from gateway.predict.thinking import Motions, inferred, trusted
-from gateway.settings import Site
+from gateway.settings import Runway
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -104,11 +106,11 @@ class _Flown:
 
 
 def chosen(
-    before: Minds, minds: Minds, at: int, now: Motions, goals: Stacked, climb: Floats, site: Site
+    before: Minds, minds: Minds, at: int, now: Motions, goals: Stacked, climb: Floats, frame: RunwayFrame
 ) -> tuple[Chosen, Minds]:
     """What is believed of n aircraft that climb so fast (n,), and what is thought of them from now on."""
     declared = _Declared.of(goals)
-    seen, belief, off = _inferred(before, at, now, goals, climb, site)
+    seen, belief, off = _inferred(before, at, now, goals, climb, frame)
     join = joining(now, declared.begins, declared.goal)
     trust = trusted(before, at, now, declared.goal, join, declared.circles, declared.since)
     trusts = or_zero(trust) >= TRUSTED
@@ -165,13 +167,13 @@ def _shares(inferred_share: Floats, declared: Ints, trust: Floats) -> Floats:
 
 
 def _inferred(
-    before: Minds, at: int, now: Motions, goals: Stacked, climb: Floats, site: Site
+    before: Minds, at: int, now: Motions, goals: Stacked, climb: Floats, frame: RunwayFrame
 ) -> tuple[Seen, Belief, Floats]:
     """`thinking.inferred`, in which only who is on final lands or goes around."""
-    final = _on_final(now, site)
+    final = _on_final(now, at, frame)
     lowered = goals.lowered.copy()
     lowered[:, RUNWAY] *= final
-    lowered[:, GO_AROUND] *= final * _goes_around(now, climb, site)
+    lowered[:, GO_AROUND] *= final * _goes_around(now, climb, frame.runway)
     return inferred(before, at, now, goals.route[:, :, 0], goals.planned, lowered)
 
 
@@ -193,19 +195,25 @@ def _circled(before: Minds, now: Motions, declared: _Declared) -> Floats:
     return np.where(near & (before.declared_at == declared.since), before.circled + or_zero(turned), 0.0)
 
 
-def _on_final(now: Motions, site: Site) -> Bools:
-    """Who flies towards the runway along its centreline, (n,)."""
-    sine, cosine = math.sin(site.runway.landing_compass_rad), math.cos(site.runway.landing_compass_rad)
-    along = now.position[:, 0] * sine + now.position[:, 1] * cosine - site.runway.aiming_point_x_m
-    left = now.position[:, 1] * sine - now.position[:, 0] * cosine
-    flies = now.velocity[:, 0] * sine + now.velocity[:, 1] * cosine
-    aligned = flies > math.cos(math.radians(20.0)) * now.speed
+def _on_final(now: Motions, at: int, frame: RunwayFrame) -> Bools:
+    """Who flies towards the runway, which may move, along its centreline, (n,)."""
+    place, velocity, compass = now.position, now.velocity, frame.runway.landing_compass_rad
+    if (deck := frame.deck) is not None:
+        since_s = (at - deck.at) / SECOND
+        place = place - (deck.enu_m + since_s * deck.velocity_mps)[:2]
+        velocity, compass = velocity - deck.velocity_mps[:2], deck.compass_rad
+    sine, cosine = math.sin(compass), math.cos(compass)
+    along = place[:, 0] * sine + place[:, 1] * cosine - frame.runway.aiming_point_x_m
+    left = place[:, 1] * sine - place[:, 0] * cosine
+    flies = velocity[:, 0] * sine + velocity[:, 1] * cosine
+    speed = np.sqrt(velocity[:, 0] * velocity[:, 0] + velocity[:, 1] * velocity[:, 1])
+    aligned = flies > math.cos(math.radians(20.0)) * speed
     return (along < 0.0) & (along > -FINAL_M) & (np.abs(left) < 100.0 - along * math.tan(FINAL_RAD)) & aligned
 
 
-def _goes_around(now: Motions, climb: Floats, site: Site) -> Floats:
+def _goes_around(now: Motions, climb: Floats, runway: Runway) -> Floats:
     """How much likelier (n,) the climb is of who goes around than of who goes on down."""
-    down = -now.speed * math.tan(site.runway.glide_path_rad)
+    down = -now.speed * math.tan(runway.glide_path_rad)
     lands = np.exp(-0.5 * ((climb - down) / 1.5) ** 2)
     climbs = np.exp(-0.5 * ((np.minimum(climb, 2.0) - 2.0) / 1.5) ** 2)
     return np.asarray(np.clip(climbs / np.maximum(lands, 1e-6), 0.01, 100.0))

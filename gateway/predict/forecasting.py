@@ -17,9 +17,11 @@ from gateway.fuse import Lane
 from gateway.fuse.weighting import Model
 from gateway.geodesy import wrap_rad
 from gateway.predict import weather
+from gateway.predict.aboard import carried, on_deck
 from gateway.predict.candidates import weighed
 from gateway.predict.choosing import Chosen, chosen
 from gateway.predict.gates import Gates, Judged
+from gateway.predict.goals import RUNWAY
 from gateway.predict.heights import heights
 from gateway.predict.hindsight import MOVING_MPS, kept, learnt, scaled
 from gateway.predict.minds import Minds
@@ -74,6 +76,7 @@ def forecast(
     before = predicting.remembered.of(tracks)
     state = State.of(lanes, at, model)
     gates, judged = _on_final(predicting.gates, tracks, numbers, lanes, at, state, site, frame)
+    goals = on_deck(goals, lanes, at, state, frame)
     goals = goals if predicting.flows is None else predicting.flows.along(goals, state)
     goals = weather.around(goals, state, weather.areas(predicting.tellings, site, frame, at, separation_m))
     predicting, stacked = predicting.stacked(lanes[0].track, goals)
@@ -84,10 +87,12 @@ def forecast(
     now, minds = motions(
         before, at, state.position, state.velocity, state.velocity_sigma, state.sides, usual, through_air, adapts
     )
-    way, minds = chosen(before, minds, at, now, stacked, state.climb, site)
+    way, minds = chosen(before, minds, at, now, stacked, state.climb, frame)
     horizons = state.since_s[:, None] + np.array(horizons_s)
     around = beside(horizons)
     whole = _paths(now, minds, at, way, state, winds, around)
+    on_runway = (way.best == RUNWAY) & way.lands[:, 0]
+    whole = carried(whole, on_runway, way.route[:, 0], state.velocity, LANDED_MPS2, frame)
     ahead, by_points = whole.first(horizons.shape[1]), whole.follows | way.circles
     rests, inferred = _rests(way, whole), way.kind == INFERRED
     heads_round = np.isfinite(way.rounds.radius[:, 0]) | np.isfinite(way.rounds.radius[:, 1])

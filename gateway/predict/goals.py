@@ -14,7 +14,7 @@ from gateway.frames import RunwayFrame, turn
 from gateway.observation import FlightPlan, Intent, PlanPoint
 from gateway.predict.modes import circles_at_home, returning
 from gateway.predict.told import HOME_NAME, Told
-from gateway.settings import Site
+from gateway.settings import Runway, Site
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -69,8 +69,9 @@ def goals_of(told: Told | None, site: Site, frame: RunwayFrame, separation_m: fl
     names: list[str | None] = [None] * COUNT
     planned, circles = np.zeros(COUNT, dtype=np.bool_), np.zeros(COUNT, dtype=np.bool_)
     lands, over = np.zeros((COUNT, LEGS), dtype=np.bool_), np.zeros((COUNT, LEGS), dtype=np.bool_)
-    for slot, (name, enu) in zip((RUNWAY, GO_AROUND), _runway_goals(site, frame), strict=True):
-        route[slot, 0], up[slot, 0], names[slot], lands[slot, 0] = enu[:2], enu[2], name, slot == RUNWAY
+    aim, beyond = turn(frame.enu_from_runway, runway_goals(site.runway))
+    route[RUNWAY, 0], up[RUNWAY, 0], names[RUNWAY], lands[RUNWAY, 0] = aim[:2], aim[2], "runway", True
+    route[GO_AROUND, 0], names[GO_AROUND] = beyond[:2], "go-around"
     for slot, waypoint in zip(PUBLISHED, site.waypoints, strict=False):
         route[slot, 0] = frame.enu_from_geodetic(waypoint.latitude_rad, waypoint.longitude_rad, site.runway.height_m)[
             :2
@@ -222,11 +223,6 @@ def _declared_place(
     return there[:2], float(there[2])
 
 
-def _runway_goals(site: Site, frame: RunwayFrame) -> tuple[tuple[str, Floats], tuple[str, Floats]]:
-    """Where the glide path meets the runway, and where a go-around leads: on, beyond the runway's far end."""
-    runway = site.runway
-    beyond = 0.5 * runway.length_m + GO_AROUND_M
-    aim = turn(frame.enu_from_runway, [runway.aiming_point_x_m, 0.0, 0.0])
-    over = turn(frame.enu_from_runway, [beyond, 0.0, 0.0])
-    over[2] = math.nan
-    return ("runway", aim), ("go-around", over)
+def runway_goals(runway: Runway) -> Floats:
+    """Places (2, 3) in the runway frame: where the glide path meets it, and where a go-around leads, beyond its far end."""
+    return np.array([[runway.aiming_point_x_m, 0.0, 0.0], [0.5 * runway.length_m + GO_AROUND_M, 0.0, 0.0]])

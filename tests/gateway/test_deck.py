@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from gateway.frames import RunwayFrame, level_axes
 from gateway.observation import Attitude, GpsReport, Observation
 from gateway.predict.approach import Deviations, deviations
-from gateway.settings import DEMO_SITE, Options, Site, SiteError, format_site, parse_site
+from gateway.settings import DEMO_SITE, Options, Separation, Site, SiteError, format_site, parse_site
 from gateway.sinks.scene.deck import STANDING, DeckScene
 from gateway.sinks.scene.entry import Rows
 from gateway.sinks.scene.flown import Flights
@@ -23,7 +24,7 @@ Floats = NDArray[np.float64]
 LIGHT = Options(estimator="kalman")  # the deck is the same with any
 Run = Any  # tests.gateway.conftest's
 
-SHIP, PLANE = "mavlink:7", "mavlink:1"
+SHIP, PLANE, HOVERS = "mavlink:7", "mavlink:1", "mavlink:2"
 RUNWAY = replace(
     DEMO_SITE.runway,
     landing_compass_rad=math.radians(350.0),  # a deck at ten degrees to the left of the bow
@@ -32,7 +33,7 @@ RUNWAY = replace(
     threshold_crossing_height_m=8.0,
     follows=SHIP,
 )
-SITE = Site("carrier", RUNWAY)
+SITE = Site("carrier", RUNWAY, separation=Separation(least_height_m=-50.0))  # who is on the sea would be probed too
 CLOSING_MPS, BEGINS_M, SECONDS = 60.0, 4000.0, 60.0
 
 
@@ -51,17 +52,26 @@ def _sailed(turn_degps: float) -> Callable[[float], tuple[Floats, Floats, float]
     return at
 
 
-def _aboard(
-    world: Any, turn_degps: float = 0.0, silent_from_s: float = math.inf, yaws_deg: float = 0.0
-) -> list[Observation]:
-    """A ship, and an aircraft down her glide path: positions once a second, velocities by differences, attitudes of the ship."""
-    frame, sailed = RunwayFrame(RUNWAY), _sailed(turn_degps)
+def _flown(turn_degps: float, t_s: float) -> Floats:
+    """Where who flies down the glide path of that ship is, east, north, up."""
+    place, _, heading = _sailed(turn_degps)(t_s)
+    before_m = BEGINS_M - CLOSING_MPS * t_s
+    relative = np.array([RUNWAY.aiming_point_x_m - before_m, 0.0, before_m * math.tan(RUNWAY.glide_path_rad)])
+    return place + level_axes(heading + RUNWAY.landing_compass_rad).T @ relative
 
-    def flown(t_s: float) -> Floats:
-        place, _, heading = sailed(t_s)
-        before_m = BEGINS_M - CLOSING_MPS * t_s
-        relative = np.array([RUNWAY.aiming_point_x_m - before_m, 0.0, before_m * math.tan(RUNWAY.glide_path_rad)])
-        return place + level_axes(heading + RUNWAY.landing_compass_rad).T @ relative
+
+def _aboard(
+    world: Any,
+    turn_degps: float = 0.0,
+    silent_from_s: float = math.inf,
+    yaws_deg: float = 0.0,
+    hovers_at_s: float | None = None,
+) -> list[Observation]:
+    """A ship, and an aircraft down her glide path: positions once a second, velocities by differences, attitudes of the ship.
+
+    With a second aircraft, if wanted, that stands still in the air where the first one is at a time.
+    """
+    frame, sailed, flown = RunwayFrame(RUNWAY), _sailed(turn_degps), partial(_flown, turn_degps)
 
     def report(who: str, t_s: float, place: Floats, velocity: Floats) -> GpsReport:
         latitude, longitude, height = (float(one) for one in frame.geodetic_from_enu(place))
@@ -90,6 +100,8 @@ def _aboard(
         t_s = 0.5 * k
         if k % 2:
             found.append(report(PLANE, t_s, flown(t_s), (flown(t_s + 0.01) - flown(t_s - 0.01)) / 0.02))
+            if hovers_at_s is not None:
+                found.append(report(HOVERS, t_s, flown(hovers_at_s), np.zeros(3)))
         if t_s < silent_from_s:
             place, velocity, heading = sailed(t_s)
             if k % 2 == 0:
@@ -114,8 +126,8 @@ def _off(pictures: Any, site: Site = SITE) -> tuple[Floats, Deviations]:
 
 @pytest.fixture(scope="module")
 def straight(world: Any) -> Run:
-    """A ship that sails straight on, and the aircraft that lands on her."""
-    run: Run = world.with_site(SITE).run(_aboard(world), options=LIGHT)
+    """A ship that sails straight on, the aircraft that lands on her, and one that is in its way."""
+    run: Run = world.with_site(SITE).run(_aboard(world, hovers_at_s=45.0), options=LIGHT)
     return run
 
 
@@ -176,6 +188,34 @@ def test_the_aircraft_passes_its_gate_stabilised(straight: Run) -> None:
     assert run.said("passes the gate")
     assert not run.said("not stabilised")
     assert not run.said("on final")
+
+
+def test_the_ship_that_is_the_runway_is_no_conflict(straight: Run) -> None:
+    """The aircraft and the one in its way are told; neither is with the ship, who comes nearer than any of them."""
+    names = {row["track"]: row["aircraft"] for row in straight.rows()}
+    pairs = {
+        frozenset(names[one] for one in pair) for each in straight.pictures for pair in each.predict.conflicts.pair
+    }
+    assert pairs == {frozenset((PLANE, HOVERS))}
+
+
+def test_predictions_lead_to_where_the_deck_will_be(world: Any, straight: Run) -> None:
+    """On final the aircraft is foretold 30 s ahead within 15 m, and aboard the ship, where she is then, after it has landed."""
+    frame = RunwayFrame(RUNWAY)
+    (number,) = {row["track"] for row in straight.rows(aircraft=PLANE)}
+    checked = 0
+    for told in (picture.predict for picture in straight.pictures):
+        enu = frame.enu_from_geodetic(told.latitude_rad, told.longitude_rad, told.height_m)
+        for row in np.flatnonzero((told.track == number) & (told.made >= world.at(25.0))):
+            ahead_s, then_s = told.horizon_s[row], (told.valid[row] - world.at(0.0)) / 1e9
+            if ahead_s == 30.0 and then_s < SECONDS:
+                assert told.intent[row] == "runway"
+                assert np.linalg.norm(enu[row] - _flown(0.0, then_s)) < 15.0
+                checked += 1
+            if ahead_s == 60.0:
+                assert np.linalg.norm(enu[row, :2] - _sailed(0.0)(then_s)[0][:2]) < 0.5 * RUNWAY.length_m + 10.0
+                checked += 1
+    assert checked > 30
 
 
 def test_a_site_that_follows_is_written_and_read_again() -> None:
