@@ -95,6 +95,7 @@ def sail_in_step(vessel: Vessel, linked: LinkedVehicles, until_s: float) -> list
             time.sleep(_UNSTEERED_S)
         deadline = time.monotonic() + _ANSWER_S
         while is_steered and speaker.taken == before and vessel.mode != "HOLD" and time.monotonic() < deadline:
+            wait([linked.link], _LONGEST_WAIT_S)
             linked.listen(time.monotonic_ns())
         if is_steered and speaker.taken == before and vessel.mode == "MANUAL":
             raise TimeoutError(f"nobody steers the ship since {moment.time_s:.1f} s of her time")
