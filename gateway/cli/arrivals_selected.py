@@ -176,8 +176,8 @@ def flown_by(compared: Compared, flights: Sequence[int]) -> dict[str, Any]:
     }
 
 
-def table_of(compared: Compared, tracks: Sequence[Track]) -> Table:
-    """For the terminal."""
+def table_of(rows: Sequence[dict[str, Any]]) -> Table:
+    """`document`'s rows for the terminal."""
     import statistics
 
     from rich.table import Table
@@ -197,7 +197,7 @@ def table_of(compared: Compared, tracks: Sequence[Track]) -> Table:
     )
     for place, heading in enumerate(headings):
         shown.add_column(heading, justify="right" if place else "left", no_wrap=True)
-    for row in document(compared, tracks):
+    for row in rows:
         flights = row["flights"]
         heights = [one["height_at_entry_m"] for one in flights]
         saved = [direct["saved_m"] / 1000.0 for one in flights for direct in one["direct"]]
@@ -217,10 +217,10 @@ def table_of(compared: Compared, tracks: Sequence[Track]) -> Table:
     return shown
 
 
-def shortcuts(compared: Compared, tracks: Sequence[Track]) -> list[str]:
-    """Who was let go direct how often, the most frequent first, in words."""
+def shortcuts(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Who was let go direct how often, by `document`'s rows: the most frequent first, in words."""
     counts: dict[tuple[str, str, str], list[float]] = {}
-    for row in document(compared, tracks):
+    for row in rows:
         for one in row["flights"]:
             for direct in one["direct"]:
                 counts.setdefault((row["procedure"], direct["after"], direct["to"]), []).append(direct["saved_m"])

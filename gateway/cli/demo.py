@@ -64,7 +64,7 @@ def demo(
     from gateway.runtime.setup import Place, RunFailure, Setup
     from gateway.runtime.signals import StopSignals
     from gateway.runtime.urls import LinkError, Url
-    from gateway.settings import format_site, parse_site
+    from gateway.settings import Options, format_site, parse_site
 
     looks = take.Viewer.none if headless else chosen(viewer)
     links: list[Link] = []
@@ -74,7 +74,7 @@ def demo(
         text = format_site(world.site)
         setup = Setup(
             place=Place(parse_site(text), text, "demo"),
-            options=take.choose(weighting, association, estimator),
+            options=take.choose(Options(), weighting=weighting, association=association, estimator=estimator),
             archive=archive,
             serve=take.read_serve(serve, looks),
             live=True,

@@ -17,7 +17,7 @@ from gateway.cli.places import read_place_deg
 from gateway.cli.spread import spread
 
 if TYPE_CHECKING:
-    from gateway.offline.flows import Flows, Track
+    from gateway.offline.flows import Flows, Method, Track
     from gateway.offline.procedures import Compared
     from gateway.runtime.arrivals import Flight
 
@@ -82,12 +82,9 @@ def flows(
     telling: take.Telling = take.Telling(),
 ) -> None:
     """Find flows."""
-    from gateway.offline.flows import METHODS, found
     from gateway.runtime.arrivals import ArrivalsError, arrivals_among
 
-    chosen = next((one for one in METHODS if one == method), None)
-    if chosen is None:
-        raise UsageError(f"--method {method!r} is none of {', '.join(METHODS)}.")
+    chosen = _method(method)
     where = None if airport is None else read_place_deg(airport, "--airport")
     published = selection.published()
     paths = expanded(files, crew)
@@ -99,24 +96,38 @@ def flows(
         raise UsageError(str(error)) from error
     tracks = selection.of(tracks, published, where)
     beside = selection.compared(tracks, published, where)
+    result = _found(tracks, chosen, least)
+    if archive is not None:
+        _archive(archive, tracks, result, where, beside)
+    if telling.json:
+        print(text.dumps(_document(tracks, result, where, left_out, beside) | {"failed": failed}))
+    elif not telling.quiet:
+        _show(tracks, result, where, left_out, beside)
+        if archive is not None:
+            print(f"archived in {archive}; look: rerun {archive / 'flows.rrd'}")
+    tell_failures(failed, len(paths))
+
+
+def _method(name: str) -> Method:
+    """The method of this name. Raises UsageError."""
+    from gateway.offline.flows import METHODS
+
+    chosen = next((one for one in METHODS if one == name), None)
+    if chosen is None:
+        raise UsageError(f"--method {name!r} is none of {', '.join(METHODS)}.")
+    return chosen
+
+
+def _found(tracks: tuple[Track, ...], method: Method, least: int) -> Flows:
+    """The flows of some arrivals. Raises RunError."""
+    from gateway.offline.flows import found
+
     try:
-        result = found(tracks, chosen, least_flights=least)
+        return found(tracks, method, least_flights=least)
     except ModuleNotFoundError as error:
         raise RunError(
             "--method default needs scikit-learn, which is not installed: pip install 'talkdown[flows]', or --method jaccard."
         ) from error
-    if archive is not None:
-        _archive(archive, tracks, result, where, beside)
-    if telling.json:
-        told = {} if beside is None else {"procedures": document(beside, tracks)}
-        print(text.dumps(_document(tracks, result, where, left_out, beside) | told | {"failed": failed}))
-    elif not telling.quiet:
-        _show(tracks, result, where, left_out, beside)
-        if beside is not None:
-            _show_procedures(beside, tracks)
-        if archive is not None:
-            print(f"archived in {archive}; look: rerun {archive / 'flows.rrd'}")
-    tell_failures(failed, len(paths))
 
 
 def _read(paths: list[Path], crew: Crew, *, show: bool) -> tuple[list[Flight], list[dict[str, str]]]:
@@ -172,11 +183,16 @@ def _document(
             for flow in result.flows
         ],
         "alone": [
-            {"flight": track.name, "aside_m": None if math.isnan(aside) else aside}
-            for track, label, aside in zip(tracks, result.labels, result.aside_m.tolist(), strict=True)
-            if label < 0
+            {"flight": name, "aside_m": None if math.isnan(aside) else aside} for name, aside in _alone(tracks, result)
         ],
+        **({} if beside is None else {"procedures": document(beside, tracks)}),
     }
+
+
+def _alone(tracks: tuple[Track, ...], result: Flows) -> list[tuple[str, float]]:
+    """Who came no way of many, and how far aside of the nearest one, m, NaN = there is none."""
+    rows = zip(tracks, result.labels, result.aside_m.tolist(), strict=True)
+    return [(track.name, aside) for track, label, aside in rows if label < 0]
 
 
 def _show(
@@ -204,14 +220,15 @@ def _show(
         )
     console.print(table)
     alone = [
-        track.name if math.isnan(aside) else f"{track.name} ({aside / 1000.0:.1f} km aside)"
-        for track, label, aside in zip(tracks, result.labels, result.aside_m.tolist(), strict=True)
-        if label < 0
+        name if math.isnan(aside) else f"{name} ({aside / 1000.0:.1f} km aside)"
+        for name, aside in _alone(tracks, result)
     ]
     if alone:
         console.print(f"alone: {', '.join(alone)}")
     more = f"; {left_out} more did not end low" if left_out else ""
     console.print(f"{len(tracks)} arrivals about {where[0]:.4f}, {where[1]:.4f}{more}")
+    if beside is not None:
+        _show_procedures(beside, tracks)
 
 
 def _procedure(flown: dict[str, Any]) -> tuple[str, str, str]:
@@ -223,9 +240,9 @@ def _procedure(flown: dict[str, Any]) -> tuple[str, str, str]:
 
 def _show_procedures(beside: Compared, tracks: tuple[Track, ...]) -> None:
     """Heights are above the airport."""
-    console = wide_console()
-    console.print(table_of(beside, tracks))
-    for line in shortcuts(beside, tracks):
+    console, rows = wide_console(), document(beside, tracks)
+    console.print(table_of(rows))
+    for line in shortcuts(rows):
         console.print(line)
     none = [track.name for track, one in zip(tracks, beside.flights, strict=True) if one is None]
     console.print(f"on no procedure: {len(none)} of {len(tracks)}")

@@ -104,7 +104,7 @@ def expanded(paths: Sequence[Path], crew: Crew) -> list[Path]:
         except FolderError as error:
             raise UsageError(str(error)) from error
         if not inside:
-            raise UsageError(f"{path} is no session, and holds none.")
+            raise UsageError(f"{path} is no session, and holds none: session.json is neither in it nor in its folders.")
         found.update(dict.fromkeys(inside if crew.scheduler is None else (one.absolute() for one in inside)))
     return list(found)
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -142,8 +142,6 @@ KeyOption = Annotated[
 ]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress and no summary; only failures.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the summary as one JSON object.")]
-
-
 FlowsOption = Annotated[
     str | None,
     typer.Option(
@@ -169,7 +167,16 @@ class Methods:
 
     def options(self) -> Options:
         """The options of a run."""
-        return choose(self.weighting, self.association, self.estimator, self.registration, self.dead_reckoning)
+        from gateway.settings import Options
+
+        return choose(
+            Options(),
+            estimator=self.estimator,
+            weighting=self.weighting,
+            association=self.association,
+            registration=self.registration,
+            dead_reckoning=self.dead_reckoning,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,23 +267,10 @@ def read_urls(texts: list[str], default_port: int) -> list[Url]:
         raise UsageError(str(error)) from error
 
 
-def choose(
-    weighting: Weighting,
-    association: Association,
-    estimator: Estimator = Estimator.kalman,
-    registration: Registration = Registration.apply,
-    dead_reckoning: DeadReckoning = DeadReckoning.on,
-) -> Options:
-    """The options of a run."""
-    from gateway.settings import Options
-
-    return Options(
-        estimator=estimator.value,
-        weighting=weighting.value,
-        association=association.value,
-        registration=registration.value,
-        dead_reckoning=dead_reckoning.value,
-    )
+def choose(options: Options, **methods: StrEnum | None) -> Options:
+    """The options with the methods that were asked for, by the options' names; None = as they are."""
+    chosen: dict[str, Any] = {name: one.value for name, one in methods.items() if one is not None}
+    return replace(options, **chosen)
 
 
 def read_serve(text: str | None, viewer: Viewer) -> Serve | None:
@@ -291,27 +285,3 @@ def read_serve(text: str | None, viewer: Viewer) -> Serve | None:
             f"--serve {text!r} is not HOST:PORT; write 127.0.0.1:9876 for this machine, 0.0.0.0:9876 for its network."
         )
     return Serve(host.strip("[]"), int(port))
-
-
-def change(
-    options: Options,
-    weighting: Weighting | None,
-    association: Association | None,
-    estimator: Estimator | None = None,
-    registration: Registration | None = None,
-    dead_reckoning: DeadReckoning | None = None,
-) -> Options:
-    """The options with what was asked for in place of what was archived."""
-    from dataclasses import replace
-
-    if weighting is not None:
-        options = replace(options, weighting=weighting.value)
-    if association is not None:
-        options = replace(options, association=association.value)
-    if estimator is not None:
-        options = replace(options, estimator=estimator.value)
-    if registration is not None:
-        options = replace(options, registration=registration.value)
-    if dead_reckoning is not None:
-        options = replace(options, dead_reckoning=dead_reckoning.value)
-    return options

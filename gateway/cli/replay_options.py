@@ -123,8 +123,14 @@ class Methods:
 
     def change(self, options: Options) -> Options:
         """The options with what was asked for in place of what was archived."""
-        chosen = (self.weighting, self.association, self.estimator, self.registration, self.dead_reckoning)
-        return take.change(options, *chosen)
+        return take.choose(
+            options,
+            estimator=self.estimator,
+            weighting=self.weighting,
+            association=self.association,
+            registration=self.registration,
+            dead_reckoning=self.dead_reckoning,
+        )
 
 
 def read_speed(text: str | None, default: float | None) -> float | None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from adapters.reasons import reason_of
 from gateway.geodesy import wrap_rad
 from gateway.predict import ArrivalFlow
+from gateway.runtime.whole import write_json
 from gateway.settings import Site
 
 FLOWS_FILE = "flows.json"
@@ -45,9 +46,7 @@ def write_ways(flows: Sequence[ArrivalFlow], airport_deg: tuple[float, float], f
             for flow in flows
         ],
     }
-    beside = written.with_suffix(".part")
-    beside.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
-    os.replace(beside, written)
+    write_json(written, document)
     return written
 
 
@@ -59,13 +58,13 @@ def read_ways(path: Path) -> tuple[tuple[ArrivalFlow, ...], tuple[float, float]]
     except FileNotFoundError as error:
         raise FlowsError(f"There is no {file}; `talkdown flows SESSIONS --archive DIR` makes one.") from error
     except (OSError, ValueError, RecursionError) as error:
-        raise FlowsError(f"{file} cannot be read as JSON ({error}).") from error
+        raise FlowsError(f"{file} cannot be read as JSON ({reason_of(error)}).") from error
     try:
         if document["format"] != FORMAT:
             raise ValueError(f"format {document['format']!r}")
         latitude, longitude = (float(part) for part in document["airport_deg"])
         flows = tuple(_flow(row) for row in document["flows"])
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise FlowsError(f"{file} is no list of flows that this version of Talkdown knows ({error}).") from error
     return flows, (latitude, longitude)
 

@@ -7,7 +7,6 @@ session's files are flushed, and at the end, so that the folder of a killed sess
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
 from collections.abc import Mapping
@@ -24,6 +23,7 @@ from gateway.runtime.flow_ways import read_archived
 from gateway.runtime.remembering import is_of, read_remembered
 from gateway.runtime.setup import Setup
 from gateway.runtime.typed import misfit
+from gateway.runtime.whole import write_json
 from gateway.settings import Mute, Options, Site
 
 SESSION_FILE = "session.json"
@@ -122,9 +122,7 @@ def write_record(folder: Path, record: Record) -> None:
     document: dict[str, Any] = {"format": FORMAT, **asdict(record)}
     document["started"] = _readable(record.started_at)
     document["watermark_utc"] = None if record.watermark is None else _readable(record.watermark)
-    beside = folder / (SESSION_FILE + ".part")
-    beside.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    os.replace(beside, folder / SESSION_FILE)
+    write_json(folder / SESSION_FILE, document)
 
 
 def read_record(folder: Path) -> Record:

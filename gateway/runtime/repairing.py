@@ -23,6 +23,7 @@ from gateway.runtime.loop import run_replay
 from gateway.runtime.outputs import RRD_FILE
 from gateway.runtime.playback import open_playback
 from gateway.runtime.setup import RunFailure
+from gateway.runtime.whole import write_json
 from gateway.settings import Options
 
 _KINDS: dict[str, Kind] = {"tlog": "mavlink", "pcap": "radar", "jsonl": "told"}
@@ -79,9 +80,7 @@ def _rebuild(folder: Path) -> None:
     made = _from_inputs(folder)
     os.replace(path, path.with_name(f"{SESSION_FILE}.broken"))
     for known in (made | found, made):  # what was salvaged may be spoiled itself
-        beside = path.with_name(f"{SESSION_FILE}.part")
-        beside.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-        os.replace(beside, path)
+        write_json(path, known)
         try:
             read_record(folder)
         except FolderError:

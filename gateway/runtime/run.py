@@ -131,10 +131,7 @@ class Run:
             raise self._failure(error) from error
 
     def work(
-        self,
-        arrivals: Sequence[Arrival],
-        watermark: int,
-        notes: tuple[tuple[str, str], ...] = (),
+        self, arrivals: Sequence[Arrival], watermark: int, notes: tuple[tuple[str, str], ...] = ()
     ) -> Picture | None:
         """Take in arrivals and the watermark after them; the picture, or None while the place is not known.
 
