@@ -14,6 +14,8 @@ from gateway.cli.failures import RunError, UsageError, writing
 from gateway.cli.places import read_place_deg
 
 if TYPE_CHECKING:
+    from adapters.mission_writing import MissionItem
+    from gateway.runtime.urls import Url
     from sim.planning.case import Case
     from sim.planning.flight import Flight, Wishes
 
@@ -35,7 +37,6 @@ Examples:
   talkdown plan threats.toml --upload udpin:0.0.0.0:14550
 """
 _BANK_RAD = math.radians(25.0)
-_GRAVITY_MPS2 = 9.81
 
 
 def register(app: typer.Typer) -> None:
@@ -117,10 +118,13 @@ def plan(
 ) -> None:
     """Plan a route."""
     from gateway.settings import SiteError
+    from sim.earth import GRAVITY_MPS2
     from sim.planning.flight import Wishes, plan_flight
+    from sim.planning.mission import mission
     from sim.planning.task import PlanError
 
-    radius = speed**2 / (_GRAVITY_MPS2 * math.tan(_BANK_RAD)) if turn_radius is None else turn_radius
+    link = _link(upload, vehicle)
+    radius = speed**2 / (GRAVITY_MPS2 * math.tan(_BANK_RAD)) if turn_radius is None else turn_radius
     lowest, highest = _read_height(height)
     wishes = Wishes(lowest, highest, radius, lambda_km4 * 1e12)
     place = take.read_place(site)
@@ -135,13 +139,26 @@ def plan(
     except PlanError as error:
         raise RunError(str(error)) from error
     summary = _summary(flight, wishes, speed)
-    written = _write(flight, wishes, speed, out)
+    items, home = mission(flight, speed)
+    written = _write(flight, items, home, wishes, speed, out)
     if json:
         print(text.dumps({**summary, "written": [str(path) for path in written]}))
     elif not quiet:
         _show(summary, written)
+    if link is not None:
+        _upload(items, home, link, vehicle, quiet=quiet or json)
+
+
+def _link(upload: str | None, vehicle: int | None) -> Url | None:
+    """Where the mission is given to; None: nowhere. Raises UsageError."""
+    from gateway.runtime.urls import MAVLINK_PORT
+
     if upload is not None:
-        _upload(flight, speed, upload, vehicle, quiet=quiet or json)
+        (link,) = take.read_urls([upload], MAVLINK_PORT)
+        return link
+    if vehicle is not None:
+        raise UsageError("--vehicle says whom --upload gives the mission to; add --upload URL.")
+    return None
 
 
 def _case(file: Path | None, seed: int | None, start: str | None, goal: str | None) -> Case:
@@ -176,6 +193,8 @@ def _planner(method: str, objective: str, seed: int) -> Any:
     }
     if method not in planners:
         raise UsageError(f"--method {method!r} is none of {', '.join(planners)}.")
+    if method != "seed" and chosen != OBJECTIVES[0]:
+        raise UsageError(f"--objective {objective} is for --method seed; {method} does not heed it.")
     return planners[method]
 
 
@@ -215,12 +234,18 @@ def _summary(flight: Flight, wishes: Wishes, speed_mps: float) -> dict[str, Any]
     }
 
 
-def _write(flight: Flight, wishes: Wishes, speed_mps: float, out: Path) -> list[Path]:
+def _write(
+    flight: Flight,
+    items: list[MissionItem],
+    home: tuple[float, float, float],
+    wishes: Wishes,
+    speed_mps: float,
+    out: Path,
+) -> list[Path]:
     from adapters.mission_writing import format_plan, format_waypoints
-    from sim.planning.mission import fences, mission
+    from sim.planning.mission import fences
     from sim.planning.picture import draw
 
-    items, home = mission(flight, speed_mps)
     paths = [out.with_name(f"{out.name}.{ending}") for ending in ("plan", "waypoints", "rrd")]
     with writing(out):
         paths[0].write_text(format_plan(items, home, cruise_mps=speed_mps, fences=fences(flight)), "utf-8")
@@ -256,13 +281,11 @@ def _show(summary: dict[str, Any], written: list[Path]) -> None:
     console.print(f"written: {', '.join(str(path) for path in written)}", soft_wrap=True)
 
 
-def _upload(flight: Flight, speed_mps: float, url: str, vehicle: int | None, *, quiet: bool) -> None:
+def _upload(
+    items: list[MissionItem], home: tuple[float, float, float], link: Url, vehicle: int | None, *, quiet: bool
+) -> None:
     from gateway.runtime.uploading import UploadError, upload_mission
-    from gateway.runtime.urls import MAVLINK_PORT
-    from sim.planning.mission import mission
 
-    items, home = mission(flight, speed_mps)
-    (link,) = take.read_urls([url], MAVLINK_PORT)
     try:
         said = upload_mission(link, items, home, vehicle)
     except UploadError as error:

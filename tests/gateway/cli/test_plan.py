@@ -53,6 +53,9 @@ def test_with_a_site_the_route_ends_with_the_landing_there(tmp_path: Path) -> No
     [
         ([], 2, "Say what to plan"),
         (["--seed", "1", "--method", "best"], 2, "--method 'best' is none of modern, seed, literal."),
+        (["--seed", "1", "--objective", "clearance"], 2, "is for --method seed"),
+        (["--seed", "1", "--upload", "udp:1"], 2, "is not a link"),
+        (["--seed", "1", "--vehicle", "3"], 2, "add --upload URL"),
         (["--seed", "1", "--height", "600:200"], 2, "--height '600:200' is not understood"),
         (["--seed", "1", "--goal", "runway"], 1, "needs the site file"),
         (["none.toml"], 2, "none.toml cannot be read"),
