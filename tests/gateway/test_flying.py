@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from adapters.decode import Decoder
 from gateway.estimators import inertial as ins
-from gateway.observation import AirData, Attitude, Heard, ImuSample, Many, Observation
+from gateway.observation import AirData, Attitude, GpsReport, Heard, ImuSample, Many, Observation
 from gateway.picture import Picture
 from gateway.reckon.flying import flown
 from gateway.reckon.told import Series
+from gateway.runtime.playback import open_playback
 from sim.told_pictures import FALSE_FROM_S, QUIET, SECOND, START, denials, errors_m, frozen, goes_away, pictures, told
 from sim.told_rides import honest
+
+RECORDING = Path(__file__).parents[1] / "data" / "sitl-landing-excerpt.BIN"
+MUTED = (1_767_226_335 * SECOND, 1_767_226_365 * SECOND)
 
 
 def by_radio(said: Iterable[Heard], samples_hz: int = 0) -> tuple[Heard, ...]:
@@ -112,3 +118,40 @@ def test_what_a_unit_would_tell_of_a_level_turn_is_one() -> None:
     off = ins.between(motion.latitude_rad, motion.longitude_rad, motion.height_m, origin)[0]
     assert math.hypot(*off[:2]) < 0.002 * speed * lasts_s
     assert np.linalg.norm(unit.values[:, :3], axis=1) == pytest.approx(9.806_65 / math.cos(bank), rel=1e-6)
+
+
+def test_a_recorded_approach_without_its_unit_goes_on_half_a_minute_without_positions() -> None:
+    """SITL's final approach, by attitude and airspeed five times a second: 1.5 m off each second at most, inside 3 sigma."""
+    playback = open_playback([RECORDING])
+    decoder, setup = Decoder(playback.sources), playback.setup()
+    muted, said, rows = list[GpsReport](), list[Heard](), list[tuple[int, float, float, float]]()
+    for _, one in decoder.hear_many(list(playback.arrivals()))[0]:
+        if one.now < MUTED[0] - 35 * SECOND:
+            continue
+        late = [
+            each for each in one.observations if isinstance(each, GpsReport) and MUTED[0] < each.valid_at < MUTED[1]
+        ]
+        muted += late
+        told_besides = (each for each in one.observations if not isinstance(each, ImuSample) and each not in late)
+        said.append(replace(one, observations=tuple(told_besides)))
+    for _, picture in pictures((one for one in said if one.now < MUTED[1]), 50, site=setup.place.site):
+        fuse = picture.fuse
+        for row in np.flatnonzero([by == "dead-reckoning" for by in fuse.updated_by]):
+            sigma = math.sqrt(0.5 * (fuse.covariance[row, 0] + fuse.covariance[row, 7]))
+            rows.append((int(fuse.time[row]), fuse.latitude_rad[row], fuse.longitude_rad[row], sigma))
+    assert len(rows) >= 25
+    for at, latitude, longitude, sigma in rows:
+        off_m = apart_m(nearest(muted, at), latitude, longitude)
+        assert off_m < 3.0 + 1.5 * (at - MUTED[0]) / SECOND
+        assert off_m < 3.0 * math.sqrt(2.0) * sigma
+
+
+def nearest(reports: Sequence[GpsReport], at: int) -> GpsReport:
+    """The one that was so nearest to an instant."""
+    return min(reports, key=lambda one: abs(one.valid_at - at))
+
+
+def apart_m(one: GpsReport, latitude_rad: float, longitude_rad: float) -> float:
+    """Level, from a place."""
+    east = (longitude_rad - one.longitude_rad) * math.cos(latitude_rad)
+    return math.hypot(latitude_rad - one.latitude_rad, east) * 6.371e6
