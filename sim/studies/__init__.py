@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 STUDIES = (
@@ -48,6 +48,22 @@ class Study:
     tables: tuple[Table, ...]
     figures: dict[str, float] = field(default_factory=dict)
     recording: str | None = None
+
+
+Found = tuple[Table, dict[str, float]]
+Steps = Sequence[tuple[str, Callable[[], Found]]]
+
+
+def gather(steps: Steps, progress: Progress) -> tuple[tuple[Table, ...], dict[str, float]]:
+    """The tables of a study's steps, one after another, and their figures together; drawing counts as one step more."""
+    tables: list[Table] = []
+    figures: dict[str, float] = {}
+    for place, (what, make) in enumerate(steps):
+        progress(what, place / (len(steps) + 1))
+        table, found = make()
+        tables.append(table)
+        figures |= found
+    return tuple(tables), figures
 
 
 def silent(what: str, share: float) -> None:

@@ -6,7 +6,6 @@ Source: 002-1, 3.1 and 3.2.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators.alpha_beta_gamma import Tuning, covariance, predict, start, update
-from sim.studies import Progress, Study, Table, silent
+from sim.studies import Progress, Steps, Study, Table, gather, silent
 
 Floats = NDArray[np.float64]
 
@@ -61,24 +60,18 @@ def run(runs: int = 200, seed: int = 1, *, rrd: Path | None = None, progress: Pr
     """
     from sim.studies import alpha_beta_gamma_figures, alpha_beta_gamma_peers, alpha_beta_gamma_tables
 
-    steps: tuple[tuple[str, Callable[[], tuple[Table, dict[str, float]]]], ...] = (
+    steps: Steps = (
         ("figures 3 to 5", lambda: followed(runs, seed)),
         ("honesty", lambda: alpha_beta_gamma_tables.honesty(runs, seed)),
         ("defaults", lambda: alpha_beta_gamma_tables.defaults(runs, seed)),
         ("convergence", lambda: alpha_beta_gamma_peers.convergence(runs, seed)),
         ("cost", lambda: alpha_beta_gamma_peers.cost(seed)),
     )
-    tables: list[Table] = []
-    figures: dict[str, float] = {}
-    for place, (what, make) in enumerate(steps):
-        progress(what, place / (len(steps) + 1))
-        table, found = make()
-        tables.append(table)
-        figures |= found
+    tables, figures = gather(steps, progress)
     if rrd is not None:
         progress("drawing", len(steps) / (len(steps) + 1))
         alpha_beta_gamma_figures.draw(rrd, seed)
-    return Study("alpha-beta-gamma", runs, seed, tuple(tables), figures, str(rrd) if rrd else None)
+    return Study("alpha-beta-gamma", runs, seed, tables, figures, str(rrd) if rrd else None)
 
 
 def accelerated(time_s: Floats, acceleration_mps2: Floats, velocity_mps: float = 0.0) -> Motion:

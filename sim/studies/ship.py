@@ -7,7 +7,6 @@ Source: 002-5 2, 3.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,10 +18,9 @@ from sim.ships.hull import Hull, Ship, Weather
 from sim.ships.track_control import LAWS, Route, TrackControl
 from sim.ships.voyage import STEP_S, Sea, Voyage, make_voyage
 from sim.ships.waves import Waves
-from sim.studies import Progress, Study, Table, silent
+from sim.studies import Found, Progress, Steps, Study, Table, gather, silent
 
 Floats = NDArray[np.float64]
-Found = tuple[Table, dict[str, float]]
 
 HULL = Hull()
 SEA = Waves()
@@ -38,7 +36,7 @@ def run(runs: int = 200, seed: int = 1, *, rrd: Path | None = None, progress: Pr
     """The page's figures as tables, each of the newer autopilots against the PID, and plots in an .rrd (None: no plots)."""
     from sim.studies import ship_figures
 
-    steps: tuple[tuple[str, Callable[[], Found]], ...] = (
+    steps: Steps = (
         ("a turn in calm", turned),
         ("wind", held),
         ("waves", lambda: filtered(runs, seed)),
@@ -46,17 +44,11 @@ def run(runs: int = 200, seed: int = 1, *, rrd: Path | None = None, progress: Pr
         ("adaptive", scheduled),
         ("expert", ruled),
     )
-    tables: list[Table] = []
-    figures: dict[str, float] = {}
-    for place, (what, make) in enumerate(steps):
-        progress(what, place / (len(steps) + 1))
-        table, found = make()
-        tables.append(table)
-        figures |= found
+    tables, figures = gather(steps, progress)
     if rrd is not None:
         progress("drawing", len(steps) / (len(steps) + 1))
         ship_figures.draw(rrd, seed)
-    return Study("ship", runs, seed, tuple(tables), figures, str(rrd) if rrd else None)
+    return Study("ship", runs, seed, tables, figures, str(rrd) if rrd else None)
 
 
 def autopilot(name: str, told: Waves | None = None) -> Autopilot:
