@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_discrete_are
 
 from gateway.geodesy import wrap_rad
 from sim.ships.hull import Hull
@@ -67,17 +68,7 @@ def wave_filter(hull: Hull, speed_mps: float, waves: Waves, step_s: float) -> Wa
 
 
 def steady_gain(carry: Floats, seen: Floats, noise: Floats, measured: Floats) -> Floats:
-    """The gain (n, m) that a Kalman filter ends with: a step's `carry` (n, n) and `noise`, what is `seen` (m, n) and how well.
-
-    By doubling: each round covers twice as many steps as the one before, so that twenty cover any filter's memory.
-    """
-    forth, informed, uncertain = carry.T, seen.T @ np.linalg.solve(measured, seen), noise
-    for _ in range(20):
-        shrink = np.linalg.inv(np.eye(len(carry)) + informed @ uncertain)
-        uncertain, informed, forth = (
-            uncertain + forth.T @ uncertain @ shrink @ forth,
-            informed + forth @ shrink @ informed @ forth.T,
-            forth @ shrink @ forth,
-        )
+    """The gain (n, m) that a Kalman filter ends with: a step's `carry` (n, n) and `noise`, what is `seen` (m, n) and how well."""
+    uncertain = solve_discrete_are(carry.T, seen.T, noise, measured)
     scatter = seen @ uncertain @ seen.T + measured
     return np.asarray(np.linalg.solve(scatter, seen @ uncertain).T)

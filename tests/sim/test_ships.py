@@ -106,7 +106,7 @@ def test_the_wave_filter_tells_ship_from_waves() -> None:
 
 
 def test_a_wave_filters_gain_is_the_one_a_kalman_filter_ends_with() -> None:
-    """Doubling and 3000 ordinary steps of the Riccati equation give the same gain."""
+    """It is that of 3000 ordinary steps of the Riccati equation."""
     from sim.ships.wave_filter import steady_gain
 
     carry, seen = np.array([[1.0, 0.2], [0.0, 0.99]]), np.array([[1.0, 0.0]])
