@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.frames import RunwayFrame
 from gateway.settings import Runway
 from sim.planning import modern
 from sim.planning.areas import Area
@@ -177,10 +178,8 @@ class _Centreline:
 
     def at(self, x_m: float) -> Floats:
         """The point (2,) of the centreline at this x of the runway frame."""
-        runway = self.runway
-        along = np.array([math.sin(runway.landing_compass_rad), math.cos(runway.landing_compass_rad)])
-        own = Plane(math.degrees(runway.latitude_rad), math.degrees(runway.longitude_rad))
-        return self.plane.place_m(own.place_deg(x_m * along))
+        latitude, longitude, _ = RunwayFrame(self.runway).geodetic_from_runway([x_m, 0.0, 0.0])
+        return self.plane.place_m(np.degrees([latitude, longitude]))
 
 
 def _departure(case: Case, centreline: _Centreline | None) -> tuple[Floats, Floats, Floats, Floats | None]:
