@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from gateway.offline.procedures import Compared
     from gateway.settings.procedures import Published
 
+_NUMBER = re.compile(r"0?[1-9]|[12]\d|3[0-6]")
 _WINDS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
 
 
@@ -57,45 +58,43 @@ class Selection:
     ] = None
 
     def published(self) -> Published:
-        """What the file publishes; nothing without one. Raises UsageError."""
+        """What the file publishes; nothing without one.
+
+        Raises UsageError for it, and for a --runway or --from that cannot be: before arrivals are read, which takes long.
+        """
         from gateway.runtime.published import read_published
         from gateway.settings.procedures import Published
         from gateway.settings.reading import SiteError
 
         try:
-            return Published() if self.procedure is None else read_published(self.procedure)
+            found = Published() if self.procedure is None else read_published(self.procedure)
         except SiteError as error:
             raise UsageError(str(error)) from error
+        if self.come_from is not None:
+            read_sector(self.come_from)
+        names = [runway.name for runway in found.runways]
+        if self.runway is not None and self.runway not in names and _NUMBER.fullmatch(self.runway) is None:
+            known = (
+                f"; there are {', '.join(names)}" if names else ", given with --procedure, to tell parallel ones apart"
+            )
+            raise UsageError(
+                f"--runway {self.runway!r} is neither a number, 01 to 36, nor the name of a [[runway]]{known}."
+            )
+        return found
 
     def of(
         self, tracks: tuple[Track, ...], published: Published, airport_deg: tuple[float, float]
     ) -> tuple[Track, ...]:
-        """Those of the arrivals that were asked for. Raises UsageError."""
+        """Those of the arrivals that were asked for. Raises UsageError where there are none."""
         from gateway.offline.procedures import comes_from
 
-        chosen = tracks if self.runway is None else self._landing(tracks, published, airport_deg)
+        chosen = tracks if self.runway is None else _landing(tracks, self.runway, published, airport_deg)
         if self.come_from is not None:
             sector = read_sector(self.come_from)
             chosen = tuple(track for track in chosen if comes_from(track, *sector))
         if not chosen:
             raise UsageError(f"None of {len(tracks)} arrivals is as --runway and --from want it.")
         return chosen
-
-    def _landing(
-        self, tracks: tuple[Track, ...], published: Published, airport_deg: tuple[float, float]
-    ) -> tuple[Track, ...]:
-        from gateway.offline.procedures import lands_on, runway_of
-        from gateway.runtime.published import thresholds_about
-
-        wanted = str(self.runway)
-        names = [runway.name for runway in published.runways]
-        if wanted in names:
-            thresholds = thresholds_about(published, airport_deg)
-            return tuple(track for track in tracks if runway_of(track, *thresholds) == names.index(wanted))
-        if re.fullmatch(r"0?[1-9]|[12]\d|3[0-6]", wanted):
-            return tuple(track for track in tracks if lands_on(track, int(wanted)))
-        known = f"; there are {', '.join(names)}" if names else ", given with --procedure, to tell parallel ones apart"
-        raise UsageError(f"--runway {wanted!r} is neither a number, 01 to 36, nor the name of a [[runway]]{known}.")
 
     def compared(
         self, tracks: tuple[Track, ...], published: Published, airport_deg: tuple[float, float]
@@ -107,6 +106,20 @@ class Selection:
         names = [runway.name for runway in published.runways]
         procedures = procedures_about(published, airport_deg, self.runway if self.runway in names else None)
         return compared(tracks, procedures) if procedures else None
+
+
+def _landing(
+    tracks: tuple[Track, ...], wanted: str, published: Published, airport_deg: tuple[float, float]
+) -> tuple[Track, ...]:
+    """Those that land on a runway, by its name or else its number."""
+    from gateway.offline.procedures import lands_on, runway_of
+    from gateway.runtime.published import thresholds_about
+
+    names = [runway.name for runway in published.runways]
+    if wanted not in names:
+        return tuple(track for track in tracks if lands_on(track, int(wanted)))
+    thresholds = thresholds_about(published, airport_deg)
+    return tuple(track for track in tracks if runway_of(track, *thresholds) == names.index(wanted))
 
 
 def read_sector(written: str) -> tuple[float, float]:

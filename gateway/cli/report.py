@@ -191,7 +191,6 @@ def _show_entries(entries: Sequence[Entry]) -> None:
         console.print(table)
     counts = Counter(one.grade for entry in entries for one in entry.approaches)
     grades = ", ".join(f"{grade} {count}" for grade, count in sorted(counts.items())) or "none"
-    nobody = sum(not entry.approaches and entry.failure is None for entry in entries)
-    console.print(
-        f"approaches: {grades}; of {len(entries)} sessions {nobody} without one", soft_wrap=True, markup=False
-    )
+    read = [entry for entry in entries if entry.failure is None]
+    nobody = sum(not entry.approaches for entry in read)
+    console.print(f"approaches: {grades}; of {len(read)} sessions {nobody} without one", soft_wrap=True, markup=False)

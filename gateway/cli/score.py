@@ -90,7 +90,7 @@ def _score_many(sessions: Sequence[Path], crew: Crew, telling: take.Telling) -> 
         documents = [{"session": str(session), **one.document()} for session, one in scored.items()]
         pool = list(map(_document, together))
         print(text.dumps({"sessions": documents, "pooled": pool, "failed": failed}))
-    elif not telling.quiet:
+    elif together and not telling.quiet:
         _show_each(names_of(list(scored)), [one.rows for one in scored.values()], together)
         _show(together, {})
     tell_failures(failed, len(sessions))
@@ -102,12 +102,11 @@ def _document(one: Score) -> dict[str, Any]:
 
 
 def _show(found: Sequence[Score], against: dict[str, str]) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     errors = ("RMS m", "straight on m", "along m", "across m", "height m")
     columns = ("horizon s", "points", *errors, "along within 1, 2 sigma %", "across %")
-    console, group = Console(highlight=False), ""
+    console, group = wide_console(), ""
     table = Table(box=None, padding=(0, 2, 0, 0))
     for place, heading in enumerate(("predictions", *columns)):
         table.add_column(heading, justify="right" if place else "left")

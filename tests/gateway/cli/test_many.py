@@ -100,6 +100,8 @@ def test_a_folder_of_sessions_is_replayed_reported_scored_and_read_for_flows(
         (["report", "{many}", "nowhere"], "nowhere is no session"),
         (["score", "{none}"], "is no session, and holds none"),
         (["score", "{many}", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "--workers is of this machine"),
+        (["flows", "{none}", "--from", "Q"], "--from 'Q' is not understood"),  # said before anything is read
+        (["flows", "{none}", "--runway", "37"], "--runway '37' is neither a number"),
         (["sessions", "{many}", "--keep", "0s"], "say --yes, or --dry-run"),
         (["sessions", "{many}", "--keep", "soon"], "'soon' is no length of time"),
     ],
