@@ -11,7 +11,8 @@ import numpy as np
 from gateway.align import SECOND, Fix, ReckonedFix
 from gateway.making import Making
 from gateway.observation import GpsReport, Heard, Many, Observation, VehicleStatus
-from gateway.reckon import NOTHING, Easing, Reckoned, reads
+from gateway.picture import Event
+from gateway.reckon import NOTHING, Easing, LastPlace, Reckoned, reads
 
 SURE_SIGMA = 6.0
 TURNED_MPS2 = 10.0  # the acceleration may have changed by so much since dead reckoning came so far
@@ -36,18 +37,39 @@ class Believing(Making):
 
     def _believed(self, fix: Fix, report: GpsReport) -> Fix | None:
         """A position as fuse takes it: as it is, eased where it comes back, or None where inertial data deny it."""
-        if not self.reckoners.by_aircraft or fix.aircraft not in self.reckoners.by_aircraft:
-            return fix
-        self.reckoners = self.reckoners.placed(fix.aircraft, fix.at, self._place_of(fix, report))
-        expected = self.reckoners.of(fix.aircraft, fix.at)
+        expected = None
+        if fix.aircraft in self.reckoners.by_aircraft:
+            self.reckoners = self.reckoners.placed(fix.aircraft, fix.at, self._place_of(fix, report))
+            expected = self.reckoners.of(fix.aircraft, fix.at)
         if expected is None:
-            return fix
+            return None if self._is_frozen(report, fix.at) else fix
         if self.site.dead_reckoning.refuses and (expected.denied != NOTHING or self._is_denied(fix, expected)):
             if expected.denied == NOTHING:
                 self.reckoners = self.reckoners.suspecting(fix.aircraft)
             self.count("GPS reports that inertial data deny")
             return None
         return self._eased(fix, expected)
+
+    def _is_frozen(self, report: GpsReport, at: int) -> bool:
+        """Whether a vehicle, of which nothing else tells how it moves, tells one place while its velocity says that it moves."""
+        name, here = report.aircraft, (report.latitude_rad, report.longitude_rad)
+        if name not in self.reckoners.types or not self.site.dead_reckoning.refuses:
+            return False
+        east, north = report.velocity_east_mps, report.velocity_north_mps
+        speed = None if east is None or north is None else math.hypot(east, north)
+        known = self.reckoners.told_last.get(name)
+        last = LastPlace(*here, at, at) if known is None else known.followed_by(at, *here, speed)
+        self.reckoners = self.reckoners.telling(name, last)
+        if last.is_frozen:
+            self.count("GPS reports that are frozen")
+            if known is not None and not known.is_frozen:
+                text = (
+                    "its position stays the same while its velocity says that it moves: it is not used until it changes"
+                )
+                self.events.append(Event(at, "warning", f"{name}: {text}"))
+        elif known is not None and known.is_frozen:
+            self.events.append(Event(at, "info", f"{name}: its position changes again, and is used"))
+        return last.is_frozen
 
     def _place_of(self, fix: Fix, report: GpsReport) -> tuple[float, ...]:
         """As dead reckoning reads a position (told.PLACE)."""

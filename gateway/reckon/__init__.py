@@ -1,14 +1,16 @@
 """Dead reckoning live: what vehicles tell of their own motion carries them on while their positions are away, or are denied.
 
-`told` holds what was told in columns, `cells` cuts it into tenths of a second, `running` runs the filters of many vehicles
-side by side, `ties` what these are tied to, `judging` says which positions are to be believed, `vehicle` remembers one vehicle,
-`reckoned` is where it is, `reckoners` is all of that as one immutable value. Source: 002-4.
+`told` holds what was told in columns, `flying` what a unit would have told of vehicles that have none, `cells` cuts it into
+tenths of a second, `running` runs the filters of many vehicles side by side, `ties` what these are tied to, `judging` says
+which positions are to be believed, `freezing` whether a place only stays the same, `vehicle` remembers one vehicle, `reckoned`
+is where it is, `reckoners` is all of that as one immutable value. Source: 002-4.
 """
 
+from gateway.reckon.freezing import LastPlace
 from gateway.reckon.reckoned import Reckoned
 from gateway.reckon.reckoners import Easing, Reckoners
 from gateway.reckon.tip import JUMPED, NOTHING, WALKED_OFF
 from gateway.reckon.told import reads
 from gateway.reckon.vehicle import Reckoner
 
-__all__ = ["JUMPED", "NOTHING", "WALKED_OFF", "Easing", "Reckoned", "Reckoner", "Reckoners", "reads"]
+__all__ = ["JUMPED", "NOTHING", "WALKED_OFF", "Easing", "LastPlace", "Reckoned", "Reckoner", "Reckoners", "reads"]

@@ -15,6 +15,7 @@ import numpy as np
 
 from gateway.observation import Observation
 from gateway.reckon.cells import CELL_NS, SECOND, Cells, cells, covered_until
+from gateway.reckon.freezing import LastPlace
 from gateway.reckon.reckoned import Floats, Reckoned, reckoned, wind_mps
 from gateway.reckon.running import run
 from gateway.reckon.ties import WINGS, Kinds
@@ -66,6 +67,7 @@ class Reckoners:
     suspects: tuple[str, ...] = ()  # whose positions were refused as they came, since the last second
     planned: tuple[tuple[int, Share], ...] = ()  # when which vehicles go on
     easings: Mapping[str, Easing] = field(default_factory=dict)
+    told_last: Mapping[str, LastPlace] = field(default_factory=dict)  # of vehicles that are not followed
     crowded: bool = False  # more tell of their motion than are followed
 
     def hearing(self, added: int, observations: Sequence[Observation]) -> Reckoners:
@@ -102,6 +104,10 @@ class Reckoners:
     def placed(self, aircraft: str, at: int, place: tuple[float, ...]) -> Reckoners:
         """The same with a position that a vehicle told, as `told.PLACE`."""
         return replace(self, places=(*self.places, (aircraft, at, place)))
+
+    def telling(self, aircraft: str, last: LastPlace) -> Reckoners:
+        """The same with the place that a vehicle told last."""
+        return replace(self, told_last={**self.told_last, aircraft: last})
 
     def easing(self, aircraft: str, easing: Easing) -> Reckoners:
         """The same with how a vehicle's positions are approached."""

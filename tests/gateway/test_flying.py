@@ -13,8 +13,9 @@ import pytest
 
 from adapters.decode import Decoder
 from gateway.estimators import inertial as ins
-from gateway.observation import AirData, Attitude, GpsReport, Heard, ImuSample, Many, Observation
+from gateway.observation import AirData, Attitude, GpsReport, Heard, ImuSample, Many, Observation, VehicleStatus
 from gateway.picture import Picture
+from gateway.reckon import LastPlace
 from gateway.reckon.flying import flown
 from gateway.reckon.told import Series
 from gateway.runtime.playback import open_playback
@@ -83,6 +84,38 @@ def test_a_position_that_freezes_while_it_flies_is_refused_and_the_track_goes_on
     assert word == "denied"
     assert 10.0 < since_s <= 12.0
     assert max(off for since_s, _, off, _ in errors_m(teller, some) if 10.0 < since_s < 30.0) < 60.0
+
+
+def test_a_copters_position_that_freezes_while_its_velocity_tells_of_flight_is_refused() -> None:
+    """Of a vehicle of which nothing else tells how it moves; the track coasts, and positions that change again are used."""
+    teller, said = told("car", honest)
+    plain = [
+        replace(
+            one, observations=tuple(each for each in one.observations if isinstance(each, GpsReport | VehicleStatus))
+        )
+        for one in said
+    ]
+    until = START + (FALSE_FROM_S + 10.0) * SECOND
+    stuck = [
+        *(one for one in frozen(plain, FALSE_FROM_S) if one.now < until),
+        *(one for one in plain if one.now >= until),
+    ]
+    some = [picture for _, picture in pictures(stuck)]
+    texts = [(event.at, event.text) for picture in some for event in picture.events if "its position" in event.text]
+    assert ["stays the same" in text for _, text in texts] == [True, False]
+    assert 2.0 <= (texts[0][0] - START) / SECOND - FALSE_FROM_S < 10.0
+    assert not [row for row in errors_m(teller, some) if 9.0 < row[0] < 10.0 and row[1] == "gps"]
+    assert not [event for _, picture in pictures(plain) for event in picture.events if "its position" in event.text]
+
+
+def test_what_stands_tells_one_place_and_is_believed() -> None:
+    last = LastPlace(0.8, 0.1, START, START)
+    for second in range(1, 600):
+        last = last.followed_by(START + second * SECOND, 0.8, 0.1, 0.5 * (second % 3))
+    assert not last.is_frozen
+    for second in range(600, 603):
+        last = last.followed_by(START + second * SECOND, 0.8, 0.1, 12.0)
+    assert last.is_frozen
 
 
 def test_what_comes_in_other_portions_changes_no_bit() -> None:
