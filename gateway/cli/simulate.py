@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -180,7 +181,7 @@ def _write(scene: Scene, archive: Path, quiet: bool) -> None:
     from sim.recording import write_session
 
     try:
-        with writing(archive), _Progress(scene.duration_s, quiet) as progress:
+        with writing(archive), _telling(scene, quiet) as progress:
             folder = write_session(scene, archive, command=tuple(sys.argv[1:]), progress=progress)
     except FolderError as error:
         raise UsageError(str(error)) from error
@@ -199,7 +200,7 @@ def _send(scene: Scene, mavlink: str, radar: str, pace: float | None, quiet: boo
             raise UsageError(f"simulate sends, so it needs udpout:HOST:PORT and not {url}.")
     stop = threading.Event()
     try:
-        with sending(), StopSignals(stop.set), _Progress(scene.duration_s, quiet) as progress:
+        with sending(), StopSignals(stop.set), _telling(scene, quiet) as progress:
             sent = play(scene, mavlink_url, radar_url, speed=pace, stop=stop, progress=progress)
     except LinkError as error:
         raise UsageError(str(error)) from error
@@ -207,20 +208,10 @@ def _send(scene: Scene, mavlink: str, radar: str, pace: float | None, quiet: boo
         print(f"sent {' and '.join(f'{number} {kind}' for kind, number in sent.items()) or 'nothing'}")
 
 
-class _Progress:
-    """A bar on stderr that is told the scene's second."""
+@contextlib.contextmanager
+def _telling(scene: Scene, quiet: bool) -> Iterator[Callable[[float], None]]:
+    """A bar that is told the scene's second."""
+    from gateway.cli.progress import progressing
 
-    def __init__(self, duration_s: float, quiet: bool) -> None:
-        from rich.console import Console
-        from rich.progress import Progress
-
-        console = Console(stderr=True)
-        self._bar = Progress(console=console, transient=True, disable=quiet or not console.is_terminal)
-        self._task = self._bar.add_task("seconds of the scene", total=duration_s)
-
-    def __enter__(self) -> Callable[[float], None]:
-        self._bar.start()
-        return lambda second: self._bar.update(self._task, completed=second)
-
-    def __exit__(self, *left: object) -> None:
-        self._bar.stop()
+    with progressing("seconds of the scene", show=not quiet) as told:
+        yield lambda second: told(second / scene.duration_s)

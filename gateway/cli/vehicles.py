@@ -179,12 +179,13 @@ def _speakers(fleet: dict[int, Vehicle], kind: VehicleType, seed: int, start_ns:
 def _write(
     speakers: list[Speaker], archive: Path, start_ns: int, place: Place | None, seconds: float | None, quiet: bool
 ) -> None:
+    from gateway.cli.progress import progressing
     from gateway.runtime.folder import FolderError
     from sim.vehicles.recording import write_flight
 
     longest = _LONGEST_S if seconds is None else seconds
     try:
-        with writing(archive):
+        with writing(archive), progressing("seconds of the flight, at the most", show=not quiet) as told:
             folder = write_flight(
                 speakers,
                 archive,
@@ -192,6 +193,7 @@ def _write(
                 site=None if place is None else place.text,
                 longest_s=longest,
                 command=tuple(sys.argv[1:]),
+                progress=lambda second: told(second / longest),
             )
     except FolderError as error:
         raise UsageError(str(error)) from error
@@ -204,14 +206,14 @@ def _write(
 def _came_to(speaker: Speaker) -> str:
     """How far its mission came, in a few words."""
     from sim.vehicles.missions import LAST_NAVIGATION
-    from sim.vehicles.recording import is_at_rest
+    from sim.vehicles.recording import is_done
 
     vehicle = speaker.vehicle
-    reached, total = (
-        len(set(vehicle.mission.reached)),
-        sum(one.command <= LAST_NAVIGATION for one in vehicle.mission.items[1:]),
-    )
-    state = "at rest" if is_at_rest(speaker) else "still under way"
+    reached = len(set(vehicle.mission.reached))
+    total = sum(one.command <= LAST_NAVIGATION for one in vehicle.mission.items[1:])
+    state = "still under way"
+    if is_done(speaker):
+        state = "at rest" if vehicle.is_landed else "waiting in the air"
     return f"{state} after {vehicle.moment.time_s:.0f} s, {reached} of {total} places reached"
 
 

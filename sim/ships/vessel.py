@@ -214,6 +214,8 @@ class Vessel:
         return self._spot(before) or here, (self._spot(item) if item else None) or here
 
     def _spot(self, item: MissionItem) -> Spot | None:
+        if item.command == RETURN_HOME:
+            return Spot(0.0, 0.0, self.home.height_m)
         if item.latitude_deg == item.longitude_deg == 0.0:
             return None
         latitude, longitude = math.radians(item.latitude_deg), math.radians(item.longitude_deg)
@@ -232,12 +234,10 @@ class Vessel:
         if self.mode in ("GUIDED", "RTL"):
             self._goal = None
             self._enter("HOLD")
-        elif (item := self.mission.item) is not None:
+        elif self.mission.item is not None:
             self.notes.append(f"Reached item {self.mission.current}")
             self._do(self.mission.reach())
-            if item.command == RETURN_HOME and self.mode == "AUTO":
-                self._enter("RTL")
-            elif self.mission.is_complete and self.mode == "AUTO":
+            if self.mission.is_complete and self.mode == "AUTO":
                 self._enter("HOLD")
 
     def _enter(self, mode: str) -> None:

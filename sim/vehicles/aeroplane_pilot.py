@@ -62,12 +62,11 @@ class AeroplanePilot(Pilot[Controls]):
     def _settle(self, mode: str) -> None:
         """A circle, about home or where it is."""
         self._climbs_to_m = None
-        height = self.home.height_m + self.settings["RTL_ALTITUDE" if mode == "RTL" else "TKOFF_ALT"]
+        self._centre, self._radius_m = self.here, 0.0
         if mode == "RTL":
-            self._centre, self._radius_m = Spot(0.0, 0.0, height), 0.0
-        else:
-            north, east, now = self.here
-            self._centre, self._radius_m = Spot(north, east, height if self.is_landed else now), 0.0
+            self._centre = self._home_spot()
+        elif self.is_landed:
+            self._centre = self.here._replace(height_m=self.home.height_m + self.settings["TKOFF_ALT"])
 
     def take(self, order: TakeOff | GoTo | GoAround) -> Answer:
         """Take off straight ahead and circle; circle about a place; break off a landing."""
@@ -89,6 +88,10 @@ class AeroplanePilot(Pilot[Controls]):
         self._centre = self.plane.spot(order.latitude_rad, order.longitude_rad, height)
         self._radius_m = order.radius_m or 0.0
         return ACCEPTED
+
+    def _home_spot(self) -> Spot:
+        """The middle of the circle over home."""
+        return Spot(0.0, 0.0, self.home.height_m + self.settings["RTL_ALTITUDE"])
 
     def _hold(self) -> Spot:
         assert self._centre is not None  # every mode but MANUAL and AUTO begins with one
@@ -178,6 +181,7 @@ class AeroplanePilot(Pilot[Controls]):
             self._count_turn(centre)
         amount = item.parameters[0]
         is_over = {
+            RETURN_HOME: True,
             LOITER_TURNS: self._turned_rad >= 2.0 * math.pi * amount,
             LOITER_TIME: self._waits_s >= amount,
             DELAY: self._waits_s >= amount,
@@ -267,6 +271,7 @@ class AeroplanePilot(Pilot[Controls]):
     _WAYS: ClassVar[dict[int, Callable[[AeroplanePilot, MissionItem], Controls]]] = {
         TAKE_OFF: _take_off,
         LAND: _land,
-        RETURN_HOME: Pilot._go_home,
-        **dict.fromkeys((LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE, DELAY), _fly_circle),
+        **dict.fromkeys(
+            (LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE, DELAY, RETURN_HOME), _fly_circle
+        ),
     }

@@ -9,7 +9,7 @@ from typing import ClassVar, Generic, TypeVar
 
 from adapters.mission_writing import ABOVE_SEA, CHANGE_SPEED, MissionItem
 from sim.vehicles.body import Body, wrapped
-from sim.vehicles.missions import Mission
+from sim.vehicles.missions import RETURN_HOME, Mission
 from sim.vehicles.motion import (
     Answer,
     Arm,
@@ -115,6 +115,8 @@ class Pilot(ABC, Generic[C]):
 
     def spot(self, item: MissionItem) -> Spot:
         """Where an item leads; one without a place: here. Terrain is level here, and as high as home."""
+        if item.command == RETURN_HOME:
+            return self._home_spot()
         height = self.home.height_m + item.altitude_m
         if item.frame in (ABOVE_SEA, _ABOVE_SEA_TOO):
             height = self.home.geoid_separation_m + item.altitude_m
@@ -163,11 +165,9 @@ class Pilot(ABC, Generic[C]):
         self._do(self.mission.reach())
         self._begun = None
 
-    def _go_home(self, item: MissionItem) -> C:
-        """An item that asks for it."""
-        self._reach()
-        self.enter("RTL")
-        return self.decide()
+    @abstractmethod
+    def _home_spot(self) -> Spot:
+        """Where it ends when it goes home."""
 
     def _count_turn(self, centre: Spot) -> None:
         """How far it has gone round a place since the decision before."""

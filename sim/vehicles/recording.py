@@ -26,7 +26,7 @@ from sim.vehicles.speaking import AUTOPILOT, Speaker
 _TRUTH_EVERY = 12  # steps of what flies: four times a second
 _TOLD_EVERY_S = 5.0
 _MISSION_PLANNER = 190  # MAV_COMP_ID_MISSIONPLANNER
-_AFTERWARDS_S = 5.0  # how long it goes on after the last vehicle has come to rest
+_AFTERWARDS_S = 5.0  # how long it goes on after the last vehicle is done
 
 
 def write_flight(
@@ -39,7 +39,7 @@ def write_flight(
     command: tuple[str, ...] = (),
     progress: Callable[[float], None] = lambda second: None,
 ) -> Path:
-    """Fly vehicles that are under way, each on a link of its own, until all are at rest; the new folder inside `parent`.
+    """Fly vehicles that are under way, each on a link of its own, until all are done; the new folder inside `parent`.
 
     `site`: the text of a site file. Raises FolderError when the folder cannot be made, OSError when the disk refuses.
     """
@@ -108,17 +108,19 @@ def _flown(speakers: Sequence[Speaker], longest_s: float) -> Iterator[tuple[int,
             if vehicle.moment.time_s + vehicle.step_s <= flown_s + 1e-6:
                 moment = vehicle.step()
                 yield which, moment, speaker.say(round(flown_s * 1e9))
-        if any(not is_at_rest(speaker) for speaker in speakers):
+        if any(not is_done(speaker) for speaker in speakers):
             rests_since = flown_s
         elif flown_s - rests_since >= _AFTERWARDS_S:
             return
 
 
-def is_at_rest(speaker: Speaker) -> bool:
-    """Whether a vehicle has done what it was to do, and stands or lies still."""
+def is_done(speaker: Speaker) -> bool:
+    """Whether a vehicle has done what it was to do: it stands or lies still, or waits in the air where its mission left it."""
     vehicle = speaker.vehicle
-    is_done = not vehicle.is_armed or vehicle.mission.is_complete
-    return is_done and vehicle.is_landed and max(map(abs, vehicle.moment.velocity_mps)) < 0.5
+    if not vehicle.is_landed:
+        return vehicle.mission.is_complete
+    has_ended = not vehicle.is_armed or vehicle.mission.is_complete
+    return has_ended and max(map(abs, vehicle.moment.velocity_mps)) < 0.5
 
 
 def _truth(speaker: Speaker, moment: Moment, at: int) -> Truth:

@@ -65,9 +65,16 @@ class RotorcraftPilot(Pilot[Thrust]):
         here = self.here
         self._goal, self._heading_rad = here, self.body.attitude_rad[2]
         if mode == "RTL":
-            height = max(here.height_m, self.home.height_m + 0.01 * self.settings["RTL_ALT"])
-            self._goal = Spot(0.0, 0.0, height)
+            self._goal = self._home_spot()._replace(height_m=self._way_home_m())
         self._leg = Leg(here, self._goal)
+
+    def _home_spot(self) -> Spot:
+        """The ground at home."""
+        return Spot(0.0, 0.0, self.home.height_m)
+
+    def _way_home_m(self) -> float:
+        """The height at which it goes home."""
+        return max(self.here.height_m, self.home.height_m + 0.01 * self.settings["RTL_ALT"])
 
     def take(self, order: TakeOff | GoTo | GoAround) -> Answer:
         """Rise; go to a place and hover there."""
@@ -100,10 +107,12 @@ class RotorcraftPilot(Pilot[Thrust]):
         end, start = self.spot(item), self.here
         if self._leg is not None and distance_m(self._leg.end, start) < 2.0 * self._wp_radius():
             start = self._leg.end._replace(height_m=start.height_m)
+        if item.command == RETURN_HOME:
+            start = start._replace(height_m=self._way_home_m())
         self._leg = Leg(start, end)
         if self._leg.length_m > self._wp_radius():
             self._heading_rad = bearing_rad(start, end)
-        if item.command == LAND:
+        if item.command in (LAND, RETURN_HOME):
             self.craft.ground_m = end.height_m
 
     def _fly_leg(self, item: MissionItem) -> Thrust:
@@ -266,7 +275,7 @@ class RotorcraftPilot(Pilot[Thrust]):
     _WAYS: ClassVar[dict[int, Callable[[RotorcraftPilot, MissionItem], Thrust]]] = {
         TAKE_OFF: _take_off,
         LAND: _land,
-        RETURN_HOME: Pilot._go_home,
+        RETURN_HOME: _land,
         LOITER_TURNS: _fly_circle,
         **dict.fromkeys((DELAY, LOITER_UNLIMITED, LOITER_TIME), _wait),
         LOITER_TO_ALTITUDE: _fly_leg,
