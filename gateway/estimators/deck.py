@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from bisect import insort
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from gateway.frames import DeckPose, RunwayFrame
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 FIT_S = 30.0
 LEAST_FIT = 8  # attitudes, over at least half of the time
@@ -81,3 +83,38 @@ class Deck:
         if math.hypot(east, north) > STEERAGE_MPS:
             return math.atan2(east, north), 0.0
         return 0.0, 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class DeckPath:
+    """Where a deck was, one pose or more in the order of time: each holds until the next one's, the first before it too."""
+
+    poses: tuple[DeckPose, ...]
+
+    def place(self, time: Ints, enu_m: Floats) -> Floats:
+        """Positions (n, 3) of the ENU at times (n,), ns, in the deck's frame as it was then."""
+        found = np.empty_like(enu_m)
+        for pose, mine in self._by_pose(time):
+            found[mine] = pose.relative(time[mine], enu_m[mine])
+        return found
+
+    def velocity(self, time: Ints, velocity_mps: Floats) -> Floats:
+        """Velocities (n, 3) of the ENU less the deck's, along its axes as they were at times (n,)."""
+        found = np.empty_like(velocity_mps)
+        for pose, mine in self._by_pose(time):
+            found[mine] = pose.relative_velocity(time[mine], velocity_mps[mine])
+        return found
+
+    def compass_rad(self, time: Ints) -> Floats:
+        """The landing direction (n,) at times (n,), true."""
+        found = np.empty(len(time))
+        for pose, mine in self._by_pose(time):
+            found[mine] = pose.compass_rad + pose.turn_radps * (time[mine] - pose.at) / 1e9
+        return found
+
+    def _by_pose(self, time: Ints) -> Iterator[tuple[DeckPose, NDArray[np.intp]]]:
+        """Which of n times each pose holds for."""
+        began = np.array([pose.at for pose in self.poses], dtype=np.int64)
+        which = np.clip(np.searchsorted(began, time, side="right") - 1, 0, None)
+        for one in np.unique(which).tolist():
+            yield self.poses[one], np.flatnonzero(which == one)

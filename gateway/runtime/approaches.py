@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.estimators.deck import DeckPath
 from gateway.frames import RunwayFrame, turn
 from gateway.offline.report import Approach, Heard, approaches
-from gateway.offline.way import Flown
+from gateway.offline.way import Flown, resampled
 from gateway.runtime.archived import read_table
 from gateway.runtime.folder import FolderError, Record, read_record
 from gateway.settings import Site
@@ -50,10 +51,6 @@ def approaches_of(session: Path) -> Reported:
         site = parse_site(record.site)
     except SiteError as error:
         raise FolderError(f"The site in {session} is not understood: {error}") from error
-    if site.runway.follows is not None:
-        raise FolderError(
-            f"The runway of {session} follows a ship: reports judge approaches to runways that stand still."
-        )
     more = ("received", "track", "updated_by", "state", "radar_track")
     tracks = read_table(session, "tracks", [*_COLUMNS, *_VELOCITIES, *more])
     has_truth = (session / "truth.parquet").is_file()
@@ -63,6 +60,10 @@ def approaches_of(session: Path) -> Reported:
         one or f"track {number}"
         for one, number in zip(_words(tracks, "aircraft"), tracks["track"].to_pylist(), strict=True)
     ]
+    deck = (
+        _deck(session, frame) if site.runway.follows in names else None
+    )  # without that ship it is where it is written
+    true_deck = None if deck is None else _true_deck(deck, true, frame)
     of_truth = np.array(_words(true, "aircraft"), dtype=object)
     of_track = np.array(names, dtype=object)
     offset_ns = (record.epoch_offset_s or 0) * 1_000_000_000
@@ -70,8 +71,8 @@ def approaches_of(session: Path) -> Reported:
     for name in dict.fromkeys(names):
         own = _last_of_each_time(tracks.filter(of_track == name))
         told = _last_of_each_time(true.filter(of_truth == name))
-        known = _flown(told, frame) if len(told) > 1 else None
-        found += approaches(site, name, _flown(own, frame), _heard(own, offset_ns), known)
+        known = _flown(told, frame, true_deck) if len(told) > 1 else None
+        found += approaches(site, name, _flown(own, frame, deck), _heard(own, offset_ns), known)
     return Reported(session, record, site, tuple(sorted(found, key=lambda one: int(one.course.time[0]))))
 
 
@@ -85,11 +86,48 @@ def _last_of_each_time(table: pa.Table) -> pa.Table:
     return table.take(order[np.append(np.diff(time[order]) > 0, True)])
 
 
-def _flown(table: pa.Table, frame: RunwayFrame) -> Flown:
+def _flown(table: pa.Table, frame: RunwayFrame, deck: DeckPath | None) -> Flown:
+    """A way in the runway's frame, or the deck's as it was at each time."""
+    time, place, velocity = _flown_enu(table, frame)
+    if deck is not None:
+        return Flown(time, deck.place(time, place), deck.velocity(time, velocity))
+    return Flown(time, turn(frame.runway_from_enu, place), turn(frame.runway_from_enu, velocity))
+
+
+def _flown_enu(table: pa.Table, frame: RunwayFrame) -> tuple[NDArray[np.int64], Floats, Floats]:
     latitude, longitude, height = (_real(table, name) for name in _COLUMNS[2:])
-    place = frame.runway_from_geodetic(np.radians(latitude), np.radians(longitude), height)
-    velocity = turn(frame.runway_from_enu, np.stack([_real(table, name) for name in _VELOCITIES], axis=-1))
-    return Flown(table["time"].cast("int64").to_numpy(), place, velocity)
+    place = frame.enu_from_geodetic(np.radians(latitude), np.radians(longitude), height)
+    velocity = np.stack([_real(table, name) for name in _VELOCITIES], axis=-1)
+    return table["time"].cast("int64").to_numpy(), place, velocity
+
+
+def _deck(session: Path, frame: RunwayFrame) -> DeckPath:
+    """Where the deck was, as the picture had it."""
+    table = read_table(session, "deck")
+    place = np.stack([_real(table, f"{axis}_m") for axis in ("east", "north", "up")], axis=-1)
+    velocity = np.stack([_real(table, name) for name in _VELOCITIES], axis=-1)
+    heading = np.radians(_real(table, "landing_direction_deg")) - frame.runway.landing_compass_rad
+    columns = table["time"].cast("int64").to_pylist(), place, velocity, heading.tolist()
+    turns = np.radians(_real(table, "turn_degps")).tolist()
+    return DeckPath(tuple(map(frame.deck_pose, *columns, turns)))
+
+
+def _true_deck(deck: DeckPath, true: pa.Table, frame: RunwayFrame) -> DeckPath:
+    """The same where the ship truly was, with the heading that she told; the very same where the truth does not know her."""
+    ship = _last_of_each_time(true.filter(np.array(_words(true, "aircraft"), dtype=object) == frame.runway.follows))
+    if len(ship) < 2:
+        return deck
+    way = resampled(Flown(*_flown_enu(ship, frame)), np.array([pose.at for pose in deck.poses]))
+    return DeckPath(
+        tuple(
+            frame.deck_pose(
+                pose.at, place, velocity, pose.compass_rad - frame.runway.landing_compass_rad, pose.turn_radps
+            )
+            if np.isfinite(place).all()
+            else pose
+            for pose, place, velocity in zip(deck.poses, way.place_m, way.velocity_mps, strict=True)
+        )
+    )
 
 
 def _heard(table: pa.Table, offset_ns: int) -> Heard:

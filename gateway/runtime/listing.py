@@ -18,7 +18,7 @@ from gateway.runtime.folder import INPUTS, SESSION_FILE, FolderError, Record, re
 from gateway.runtime.outputs import RRD_FILE
 from gateway.runtime.sessions import mend, session_folders
 
-TABLES = ("tracks", "predictions", "conflicts", "truth")
+TABLES = ("tracks", "predictions", "conflicts", "truth", "deck")
 _PARQUET_ENDS, _RRD_BEGINS = b"PAR1", b"RRF2"
 
 

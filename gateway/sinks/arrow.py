@@ -16,16 +16,17 @@ import contextlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import pyarrow as pa
 
 from adapters.reasons import reason_of
+from gateway.frames import DeckPose
 from gateway.fuse import Fused
 from gateway.observation import Truth
 from gateway.picture import Picture
 from gateway.predict import Conflicts, Predicted
-from gateway.sinks.batches import SCHEMAS, conflicts_batch, predictions_batch, tracks_batch, truth_batch
+from gateway.sinks.batches import SCHEMAS, conflicts_batch, deck_batch, predictions_batch, tracks_batch, truth_batch
 
 _END_OF_STREAM = b"\xff\xff\xff\xff\x00\x00\x00\x00"
 
@@ -92,9 +93,9 @@ class _Table(Generic[Part]):
 class ArrowSink:
     """Writes tracks.arrows, predictions.arrows, conflicts.arrows and truth.arrows into a folder that exists.
 
-    Rows wait at most `period_s` of session time or until `rows_limit` of them wait. `geoid_separation_m`
-    lifts a truth that is only known above mean sea level. Every method raises OSError when the disk does not
-    take the rows.
+    And deck.arrows, once a runway moves. Rows wait at most `period_s` of session time or until `rows_limit` of them
+    wait. `geoid_separation_m` lifts a truth that is only known above mean sea level. Every method raises OSError when the
+    disk does not take the rows.
     """
 
     def __init__(
@@ -109,6 +110,8 @@ class ArrowSink:
         self._predictions: _Table[Predicted] = _Table(folder, "predictions", predictions_batch)
         self._conflicts: _Table[Conflicts] = _Table(folder, "conflicts", conflicts_batch)
         self._truth: _Table[Truth] = _Table(folder, "truth", lambda rows: truth_batch(rows, geoid_separation_m))
+        self._deck: _Table[DeckPose] | None = None
+        self._folder = folder
 
     def write(self, picture: Picture) -> None:
         """Take the rows of one step; raises OSError when a full disk refuses them."""
@@ -119,6 +122,9 @@ class ArrowSink:
         if len(picture.predict.conflicts.time):
             self._conflicts.add(picture.predict.conflicts)
         self._truth.add(*picture.truth)
+        if picture.deck:
+            self._deck = self._deck or _Table(self._folder, "deck", deck_batch)
+            self._deck.add(*picture.deck)
         self._rows += len(picture.fuse.time) + len(picture.predict.made) + len(picture.truth)
         self.flush(picture.now)
 
@@ -130,17 +136,22 @@ class ArrowSink:
             self._flushed_at = now
             self._rows = 0
             try:
-                for table in (self._tracks, self._predictions, self._conflicts, self._truth):
+                for table in self._tables:
                     table.flush()
             except OSError:
                 self._refused = True
                 raise
 
+    @property
+    def _tables(self) -> list[_Table[Any]]:
+        tables: list[_Table[Any]] = [self._tracks, self._predictions, self._conflicts, self._truth]
+        return tables if self._deck is None else [*tables, self._deck]
+
     def close(self) -> None:
         """Write out everything and end the streams; calling it again does nothing. A full disk is told once."""
         try:
             with contextlib.ExitStack() as closing:  # each, whatever another one says
-                for table in (self._truth, self._conflicts, self._predictions, self._tracks):
+                for table in reversed(self._tables):
                     closing.callback(table.close)
         except OSError:
             if not self._refused:

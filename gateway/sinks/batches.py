@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from gateway.frames import DeckPose
 from gateway.fuse import Fused
 from gateway.observation import Truth
 from gateway.predict import Conflicts, Predicted
@@ -77,7 +78,18 @@ CONFLICTS = pa.schema(
     ]
 )
 
-SCHEMAS = {"tracks": TRACKS, "predictions": PREDICTIONS, "conflicts": CONFLICTS, "truth": TRUTH}
+DECK = pa.schema(
+    [
+        pa.field("time", _TIME, nullable=False),
+        *[(f"{axis}_m", _REAL) for axis in ("east", "north", "up")],  # of the place where the site file has the runway
+        *_VELOCITY,
+        ("landing_direction_deg", _REAL),  # true
+        ("turn_degps", _REAL),  # clockwise
+    ]
+)
+"""Where a runway that follows a ship was, a row a second; no table of one that stands still."""
+
+SCHEMAS = {"tracks": TRACKS, "predictions": PREDICTIONS, "conflicts": CONFLICTS, "truth": TRUTH, "deck": DECK}
 """The tables of a session by the stem of their files."""
 
 _TRACK_TEXTS = ("aircraft", "radar_track", "updated_by", "state")
@@ -160,6 +172,19 @@ def conflicts_batch(parts: Sequence[Conflicts]) -> pa.RecordBatch:
         ),
     ]
     return pa.RecordBatch.from_arrays(columns, schema=CONFLICTS)
+
+
+def deck_batch(poses: Sequence[DeckPose]) -> pa.RecordBatch:
+    """Poses of a deck as one batch of the DECK schema."""
+    place, velocity = np.array([one.enu_m for one in poses]), np.array([one.velocity_mps for one in poses])
+    columns = [
+        _time([one.at for one in poses]),
+        *(_real(place[:, axis]) for axis in range(3)),
+        *(_real(velocity[:, axis]) for axis in range(3)),
+        _real(np.degrees([one.compass_rad for one in poses])),
+        _real(np.degrees([one.turn_radps for one in poses])),
+    ]
+    return pa.RecordBatch.from_arrays(columns, schema=DECK)
 
 
 def truth_batch(rows: Sequence[Truth], geoid_separation_m: float) -> pa.RecordBatch:

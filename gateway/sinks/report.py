@@ -61,6 +61,7 @@ def _section(
         f'<section id="{number}"><div class="grade">{escape(one.grade)}</div>',
         f"<h1>{escape(one.aircraft)}, {escape(site.name)}</h1>",
         f"<p>Approach {number} of {of} in {escape(name)}: {utc(int(course.time[0]))} UTC, {lasted:.0f} s on final.</p>",
+        *_moves(site),
         "<h2>Grade</h2><ul>" + "".join(f"<li>{escape(reason)}</li>" for reason in one.reasons) + "</ul>",
         "<p class='note'>A: nothing was wrong. B: what was wrong was right at the lower gate. C: it was not right there, "
         "that gate was not seen to be passed, or the touchdown was beside the runway.</p>",
@@ -77,6 +78,13 @@ def _section(
         f"<p>{escape(_accuracy(one))}</p></section>\n",
     ]
     return "\n".join(parts)
+
+
+def _moves(site: Site) -> list[str]:
+    if site.runway.follows is None:
+        return []
+    text = f"The runway is the deck of {site.runway.follows}: places, speeds and sink rates are relative to it as it moved."
+    return [f"<p>{escape(text)}</p>"]
 
 
 def _plots(site: Site, one: Approach) -> list[str]:
@@ -107,7 +115,13 @@ def _plots(site: Site, one: Approach) -> list[str]:
         f"{'track' if true is None else 'truth'}.</p>",
         "<h2>Profile</h2>",
         plot("Height above the runway, m", where, [path, Line("track", x, course.height_m, _TRACK)], (), marks),
-        plot("Ground speed, m/s", where, [Line("track", x, course.speed_mps, _TRACK)], (), marks),
+        plot(
+            "Ground speed, m/s" if site.runway.follows is None else "Speed relative to the deck, m/s",
+            where,
+            [Line("track", x, course.speed_mps, _TRACK)],
+            (),
+            marks,
+        ),
         plot("Sink rate, m/s", where, [Line("track", x, course.sink_mps, _TRACK)], (), marks),
     ]
 

@@ -6,16 +6,22 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from numpy.typing import NDArray
 
 from gateway.frames import RunwayFrame, level_axes
 from gateway.observation import Attitude, GpsReport, Observation
 from gateway.predict.approach import Deviations, deviations
+from gateway.runtime.approaches import approaches_of
+from gateway.runtime.folder import Record, write_record
 from gateway.settings import DEMO_SITE, Options, Separation, Site, SiteError, format_site, parse_site
+from gateway.sinks.arrow import ArrowSink
+from gateway.sinks.parquet import finish
 from gateway.sinks.scene.deck import STANDING, DeckScene
 from gateway.sinks.scene.entry import Rows
 from gateway.sinks.scene.flown import Flights
@@ -216,6 +222,26 @@ def test_predictions_lead_to_where_the_deck_will_be(world: Any, straight: Run) -
                 assert np.linalg.norm(enu[row, :2] - _sailed(0.0)(then_s)[0][:2]) < 0.5 * RUNWAY.length_m + 10.0
                 checked += 1
     assert checked > 30
+
+
+def test_an_approach_to_the_deck_is_reported_as_it_was_seen_from_her(world: Any, straight: Run, tmp_path: Path) -> None:
+    """From the archive alone: on her glide path within metres, 60 m/s nearer to her, its gate passed."""
+    with ArrowSink(tmp_path) as sink:
+        for picture in straight.pictures:
+            sink.write(picture)
+    finish(tmp_path)
+    write_record(tmp_path, Record("0", (), LIGHT, world.at(0.0), format_site(SITE)))
+    table = pq.read_table(tmp_path / "deck.parquet")
+    poses = [pose for picture in straight.pictures for pose in picture.deck]
+    np.testing.assert_allclose(table["east_m"].to_numpy(), [pose.enu_m[0] for pose in poses], atol=1e-6)
+    (found,) = approaches_of(tmp_path).approaches
+    late = found.course.time > world.at(18.0)
+    assert found.aircraft == PLANE
+    assert any(gate.which == "lower" and not gate.wrong for gate in found.gates)
+    assert np.abs(found.course.above_m[late]).max() < 3.0
+    assert np.abs(found.course.left_m[late]).max() < 3.0
+    np.testing.assert_allclose(found.course.speed_mps[late], CLOSING_MPS, atol=2.0)
+    np.testing.assert_allclose(found.course.sink_mps[late], CLOSING_MPS * math.tan(RUNWAY.glide_path_rad), atol=1.0)
 
 
 def test_a_site_that_follows_is_written_and_read_again() -> None:

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.estimators.deck import DeckPath
 from gateway.frames import DeckPose, RunwayFrame, turn
 from gateway.observation import FlightPlan, Intent
 from gateway.picture import Picture
@@ -67,36 +68,22 @@ class DeckScene:
         """Positions (n, 3) at times (n,), from the frame that stands still into the deck's as it was then."""
         if not self._poses:
             return runway_m
-        enu, found = turn(self._frame.enu_from_runway, runway_m), np.empty_like(runway_m)
-        for pose, mine in self._by_pose(time):
-            found[mine] = pose.relative(time[mine], enu[mine])
-        return found
+        return DeckPath(self._poses).place(time, turn(self._frame.enu_from_runway, runway_m))
 
     def along_mps(self, time: Ints, velocity_mps: Floats) -> Floats:
         """How fast (n,) velocities (n, 3) in the axes that stand still come along the deck, at times (n,)."""
         if not self._poses:
             return np.asarray(velocity_mps[:, 0])
-        enu, found = turn(self._frame.enu_from_runway, np.nan_to_num(velocity_mps)), np.empty(len(time))
-        for pose, mine in self._by_pose(time):
-            found[mine] = pose.relative_velocity(time[mine], enu[mine])[:, 0]
-        return found
+        enu = turn(self._frame.enu_from_runway, np.nan_to_num(velocity_mps))
+        return DeckPath(self._poses).velocity(time, enu)[:, 0]
 
     def compass_rad(self, time: Ints) -> float | Floats:
         """The direction of the frame's x at times (n,), true."""
         if not self._poses:
             return self._frame.runway.landing_compass_rad
-        found = np.empty(len(time))
-        for pose, mine in self._by_pose(time):
-            found[mine] = pose.compass_rad + pose.turn_radps * (time[mine] - pose.at) / 1e9
-        return found
+        return DeckPath(self._poses).compass_rad(time)
 
     @property
     def axes_from_enu(self) -> Floats:
         """The matrix (3, 3) from east, north, up to the axes of the scene, now."""
         return self._poses[-1].deck_from_enu if self._poses else self._frame.runway_from_enu
-
-    def _by_pose(self, time: Ints) -> list[tuple[DeckPose, NDArray[np.intp]]]:
-        """Which of n times each pose holds for: from its own on until the next one's."""
-        began = np.array([pose.at for pose in self._poses], dtype=np.int64)
-        which = np.clip(np.searchsorted(began, time, side="right") - 1, 0, None)
-        return [(self._poses[one], np.flatnonzero(which == one)) for one in np.unique(which).tolist()]
