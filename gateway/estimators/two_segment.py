@@ -106,26 +106,21 @@ def ahead(
     which points are flown round. Who cannot come to point at the route is carried on in its present turn, and does not follow.
     """
     n = len(now.position)
-    calm = np.zeros((n, 2)) if wind is None or rule == "literal" else wind
+    if rule == "literal":
+        route, wind = route[:, :1], None
+    calm, following = np.zeros((n, 2)) if wind is None else wind, _following(route)
     course, speed, air = _as_now(now, calm, air_speed)
     path = Path.at_start(now.position, course, np.broadcast_to(horizons_s, (n, np.shape(horizons_s)[-1])))
-    if rule == "literal":
-        route = route[:, :1]
-    following = _following(route)
     target, arrived = entered(path, following[:, 0], circles, 0, speed / turning_rps)
-    if lead_m is not None:
-        arrived = arrived | _passed(now, course, following, lead_m)
+    arrived = arrived | _passed(now, course, following, lead_m)
     via = target if join is None else np.where(np.isnan(join), target, join)
-    turn, rate, follows = _first_turn(now, speed, course, via, following, turning_rps, rule)
-    turn, follows = np.where(arrived, 0.0, turn), follows | arrived
-    ground, cornering, slower_from = speed, turning_rps, np.full(n, math.inf)
-    looked_at_s = path.horizons.max(axis=1)
+    turn, rate, follows = _first_turn(now, speed, course, via, following, turning_rps, rule, arrived)
+    ground, cornering, slower_from, looked_at_s = speed, turning_rps, np.full(n, math.inf), path.horizons.max(axis=1)
 
     def speed_on(heading: Floats) -> Floats:
         return ground_speed(heading, air, calm)
 
-    if join is not None:
-        turn, rate = _by_way_of(path, join, target, turn, rate, turning_rps, speed_on)
+    turn, rate = (turn, rate) if join is None else _by_way_of(path, join, target, turn, rate, turning_rps, speed_on)
     for leg in range(route.shape[1]):
         if leg:
             if (path.time_s > looked_at_s).all():  # what comes after the last horizon is nothing to anybody
@@ -138,18 +133,13 @@ def ahead(
             turn = np.where(arrived | (following[:, leg] == following[:, leg - 1]).all(axis=1), 0.0, turn)
         path.extend(ground, rate, turn / np.maximum(np.abs(rate), STRAIGHT_RPS), leg)
         ground = speed_on(path.course)
-        straight_m, cornering = _straight(path, target, following[:, leg : leg + 2], ground, turning_rps, lead_m)
-        if over is not None and lead_m is not None:
-            straight_m = straight_m + np.where(over[:, leg], lead_m, 0.0)
+        straight_m, cornering = _straight(path, target, following, leg, ground, turning_rps, lead_m, over)
         path.straight(ground, np.where(arrived, 0.0, straight_m) / ground, leg)
         if circles is not None:
             go_round(path, circles, leg, following, arrived, turning_rps, speed_on)
             ground = speed_on(path.course)
     path.stop(ground, np.zeros(n) if braking is None else braking, route.shape[1])
-    on = Path.at_start(now.position, course, path.horizons)
-    if not follows.all():
-        on.extend(speed, now.turn_rate, np.zeros(n), 0)
-    return _either(path, on, slower_from, follows)
+    return _either(path, _carried_on(now, course, speed, path.horizons, follows), slower_from, follows)
 
 
 def _as_now(now: Moving, wind: Floats, air_speed: Floats | None) -> tuple[Floats, Floats, Floats]:
@@ -159,6 +149,14 @@ def _as_now(now: Moving, wind: Floats, air_speed: Floats | None) -> tuple[Floats
         return course, ground_speed(course, air_speed, wind), air_speed
     speed = np.sqrt(now.velocity[:, 0] * now.velocity[:, 0] + now.velocity[:, 1] * now.velocity[:, 1])
     return course, speed, np.sqrt(((now.velocity - wind) ** 2).sum(axis=1))
+
+
+def _carried_on(now: Moving, course: Floats, speed: Floats, horizons_s: Floats, follows: Bools) -> Path:
+    """The paths of n aircraft on in their present turns; of those that follow none is looked at."""
+    on = Path.at_start(now.position, course, horizons_s)
+    if not follows.all():
+        on.extend(speed, now.turn_rate, np.zeros(len(speed)), 0)
+    return on
 
 
 def _either(path: Path, on: Path, slower_from: Floats, follows: Bools) -> Ahead:
@@ -183,8 +181,10 @@ def _following(route: Floats) -> Floats:
     return np.stack([*points, points[-1]], axis=1)
 
 
-def _passed(now: Moving, course: Floats, following: Floats, lead_m: Floats) -> Bools:
+def _passed(now: Moving, course: Floats, following: Floats, lead_m: Floats | None) -> Bools:
     """Who (n,) has just flown by the first point, and has another one to go to: nobody has said yet that it goes there."""
+    if lead_m is None:
+        return np.zeros(len(course), dtype=np.bool_)
     way = following[:, 0] - now.position
     behind = way[:, 0] * np.cos(course) + way[:, 1] * np.sin(course) <= 0.0
     near = (way * way).sum(axis=1) <= lead_m * lead_m
@@ -192,9 +192,16 @@ def _passed(now: Moving, course: Floats, following: Floats, lead_m: Floats) -> B
 
 
 def _first_turn(
-    now: Moving, speed: Floats, course: Floats, target: Floats, following: Floats, turning_rps: Floats, rule: Rule
+    now: Moving,
+    speed: Floats,
+    course: Floats,
+    target: Floats,
+    following: Floats,
+    turning_rps: Floats,
+    rule: Rule,
+    arrived: Bools,
 ) -> tuple[Floats, Floats, Bools]:
-    """The angle and rate of the turn that leads to the first point, and whether there is one."""
+    """The angle and rate of the turn that leads to the first point, and whether there is one; who has `arrived` needs none."""
     turns = np.abs(now.turn_rate) > STRAIGHT_RPS
     known = ~np.isnan(following[:, 0, 0])
     off = or_zero(_off(now.position, course, target))
@@ -207,9 +214,11 @@ def _first_turn(
     go = angle_to_go(now.position, course, speed / np.abs(rate), np.sign(rate), target)
     turn = np.where(~turns & (np.abs(off) <= ALIGNED_RAD), 0.0, or_zero(go))
     if rule == "literal":
-        return turn, rate, known & np.where(turns, ~np.isnan(go), np.abs(off) <= intent.ALIGNED_RAD)
-    there_is_more = (following[:, 0] != following[:, -1]).any(axis=1)  # inside the circle: it is all but there
-    return turn, rate, known & (~np.isnan(go) | there_is_more | (turn == 0.0) & (np.abs(off) <= ALIGNED_RAD))
+        leads = np.where(turns, ~np.isnan(go), np.abs(off) <= intent.ALIGNED_RAD)
+    else:
+        there_is_more = (following[:, 0] != following[:, -1]).any(axis=1)  # inside the circle: it is all but there
+        leads = ~np.isnan(go) | there_is_more | (turn == 0.0) & (np.abs(off) <= ALIGNED_RAD)
+    return np.where(arrived, 0.0, turn), rate, known & leads | arrived
 
 
 def _by_way_of(
@@ -248,23 +257,32 @@ def _next_turn(path: Path, point: Floats, ground: Floats, turning_rps: Floats) -
 
 
 def _straight(
-    path: Path, target: Floats, following: Floats, ground: Floats, turning_rps: Floats, lead_m: Floats | None
+    path: Path,
+    target: Floats,
+    following: Floats,
+    leg: int,
+    ground: Floats,
+    turning_rps: Floats,
+    lead_m: Floats | None,
+    over: Bools | None,
 ) -> tuple[Floats, Floats]:
-    """How far (n,) it is straight on to a target (n, 2), less what the turn to the point after it, (n, 1, 2), needs; its rate.
+    """How far (n,) it is straight on to a leg's target (n, 2), less what the turn to the point after it needs; its rate.
 
-    Who begins to turn late for the corner turns faster.
+    Who begins to turn late for the corner turns faster; who is to fly `over` (n, p) it begins no earlier than there.
     """
     way = target - path.position
     distance = or_zero(way[:, 0] * np.cos(path.course) + way[:, 1] * np.sin(path.course))
-    further = following[:, 1] - following[:, 0]
+    point = following[:, leg]
+    further = following[:, leg + 1] - point
     turn = wrap_rad(np.arctan2(further[:, 1], further[:, 0]) - path.course)
-    entering = (target != following[:, 0]).any(axis=1)  # a circle: it is not cut short
+    entering = (target != point).any(axis=1)  # a circle: it is not cut short
     turn = np.where((further == 0.0).all(axis=1) | np.isnan(turn) | entering, 0.0, np.abs(turn))
     radius, bend = ground / turning_rps, np.tan(0.5 * np.minimum(turn, 0.75 * math.pi))
     if lead_m is None:
         return np.maximum(distance - radius * np.minimum(bend, MOST_LEAD), 0.0), turning_rps
     faster = np.clip(radius * bend / lead_m, 1.0, FASTER)
-    return np.maximum(distance - np.minimum(radius * bend / faster, lead_m), 0.0), turning_rps * faster
+    straight_m = np.maximum(distance - np.minimum(radius * bend / faster, lead_m), 0.0)
+    return straight_m if over is None else straight_m + np.where(over[:, leg], lead_m, 0.0), turning_rps * faster
 
 
 def _off(position: Floats, course: Floats, point: Floats) -> Floats:
