@@ -67,6 +67,13 @@ def _several(one: Convert, least: int, most: int | None = None) -> Convert:
 
 _PLACE_KM = _pair(_KM, _KM, "[east, north] in km")
 _PLACE_DEG = _pair(_LATITUDE, _LONGITUDE, "[latitude, longitude] in degrees")
+_SPOT = {
+    "name": ("name", text()),
+    "latitude_deg": ("latitude_deg", _LATITUDE),
+    "longitude_deg": ("longitude_deg", _LONGITUDE),
+    "east_km": ("east_km", _KM),
+    "north_km": ("north_km", _KM),
+}
 _TABLES = {
     "route": Table(
         {
@@ -84,22 +91,14 @@ _TABLES = {
     ),
     "threat": Table(
         {
-            "name": ("name", text()),
-            "latitude_deg": ("latitude_deg", _LATITUDE),
-            "longitude_deg": ("longitude_deg", _LONGITUDE),
-            "east_km": ("east_km", _KM),
-            "north_km": ("north_km", _KM),
+            **_SPOT,
             "height_m": ("height_m", _HEIGHT),
         },
         many=True,
     ),
     "area": Table(
         {
-            "name": ("name", text()),
-            "latitude_deg": ("latitude_deg", _LATITUDE),
-            "longitude_deg": ("longitude_deg", _LONGITUDE),
-            "east_km": ("east_km", _KM),
-            "north_km": ("north_km", _KM),
+            **_SPOT,
             "radius_m": ("radius_m", number(1.0, 1e6)),
             "polygon_km": ("polygon_km", _several(_PLACE_KM, 3)),
             "polygon_deg": ("polygon_deg", _several(_PLACE_DEG, 3)),

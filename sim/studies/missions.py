@@ -16,13 +16,14 @@ from gateway.align import SECOND
 from gateway.frames import RunwayFrame
 from gateway.observation import AirData, FlightPlan, GpsReport, Intent, PlanPoint
 from gateway.settings import DEMO_SITE
+from sim.earth import GRAVITY_MPS2
 
 Said = FlightPlan | Intent | AirData | GpsReport
 Floats = NDArray[np.float64]
 
 STARTS = 1_767_225_600 * SECOND
 POINTS, STEPS = 12, 4  # points of a plan; steps of steering in a second
-AHEAD_S, BANK_RAD, GRAVITY = 4.0, math.radians(45.0), 9.80665
+AHEAD_S, BANK_RAD = 4.0, math.radians(45.0)
 SIGMA_M, SIGMA_MPS = 2.0, 0.3
 GUST_MPS, GUST_S = 1.0, 5.0
 UP_M = 600.0
@@ -83,7 +84,7 @@ def _steered(place: Floats, velocity: Floats, begins: Floats, ends: Floats, spee
     way = aim - place
     angle = math.atan2(float(velocity[0] * way[1] - velocity[1] * way[0]), float(velocity @ way))
     rate = 2.0 * ground / max(float(np.hypot(*way)), 1.0) * math.sin(max(min(angle, 1.5), -1.5))
-    most = GRAVITY * math.tan(BANK_RAD) / speed
+    most = GRAVITY_MPS2 * math.tan(BANK_RAD) / speed
     return max(min(rate, most), -most)
 
 

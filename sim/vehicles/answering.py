@@ -99,7 +99,7 @@ class Answerer:
             return self._command(command, _Command((p1, p2, p3, p4), x / 1e7, y / 1e7, z, above), station)
         if message == SET_MODE:
             number, _, _ = _read_mode(payload)
-            return self._acknowledged(11, self._enter(number), station)
+            return self._acknowledged(11, self.vehicle.order(self.mode(number)), station)
         if message == DATA_STREAM:
             self._set_stream(*_read_stream(payload))
         else:
@@ -182,12 +182,10 @@ class Answerer:
         if mask & _NO_POSITION == 0:
             self.vehicle.order(self.place(x / 1e7, y / 1e7, altitude_m, frame))
 
-    def _enter(self, number: float) -> Answer:
+    def mode(self, number: float) -> SetMode:
+        """The order to enter a mode by its number; one that there is not is called by it."""
         named = {told: name for name, told in self.vehicle.modes.items()}
-        name = named.get(int(number)) if math.isfinite(number) else None
-        return (
-            Answer("unsupported", f"there is no mode {number:g}") if name is None else self.vehicle.order(SetMode(name))
-        )
+        return SetMode(named.get(int(number), f"{number:g}") if math.isfinite(number) else f"{number:g}")
 
     def place(
         self, latitude_deg: float, longitude_deg: float, altitude_m: float, frame: int, radius_m: float | None = None
@@ -235,9 +233,8 @@ def _arm(answerer: Answerer, command: _Command) -> list[Order]:
 
 def _set_mode(answerer: Answerer, command: _Command) -> list[Order]:
     base, number, _, _ = command.parameters
-    named = {told: name for name, told in answerer.vehicle.modes.items()}
     is_custom = math.isfinite(base) and int(base) & _CUSTOM == _CUSTOM
-    return [SetMode(named.get(int(number), f"{number:g}") if is_custom and math.isfinite(number) else f"{base:g}")]
+    return [answerer.mode(number) if is_custom else SetMode(f"{base:g}")]
 
 
 def _take_off(answerer: Answerer, command: _Command) -> list[Order]:

@@ -14,7 +14,7 @@ from sim.vehicles.missions import DELAY, LOITER_TIME, LOITER_TURNS, LOITER_UNLIM
 from sim.vehicles.motion import Answer, GoAround, GoTo, TakeOff
 from sim.vehicles.piloting import ACCEPTED, DECIDES_EVERY_S, Pilot
 from sim.vehicles.rotorcraft import Rotorcraft, Thrust
-from sim.vehicles.steering import Leg, Spot, bearing_rad, distance_m, place_on
+from sim.vehicles.steering import Leg, Spot, bearing_rad, distance_m, height_on, place_on
 
 _SPEED_PER_S, _PLACE_PER_S, _CLIMB_PER_S, _LEARNS_PER_S2 = 1.2, 0.6, 0.8, 0.15
 _ASIDE_MPS = 3.0  # the most that is spent on getting back onto the leg
@@ -222,10 +222,10 @@ class RotorcraftPilot(Pilot[Thrust]):
         speed = max(speed, _CREEPS_MPS)
         aside = min(max(_PLACE_PER_S * on.right_m, -_ASIDE_MPS), _ASIDE_MPS)
         cosine, sine = math.cos(on.course_rad), math.sin(on.course_rad)
-        height = leg.start.height_m + slope * min(max(on.along_m, 0.0), length)
+        height, climb = height_on(leg, on, speed)
         self._tell(leg.end._replace(height_m=height), on.right_m, None)
         velocity = (speed * cosine + aside * sine, speed * sine - aside * cosine)
-        return self._thrust(velocity, self._climb_to(height, slope * speed))
+        return self._thrust(velocity, self._climb_to(height, climb))
 
     def _end_speed(self, item: MissionItem, leg: Leg) -> float:
         """How fast the end of a leg may be passed: straight on at full speed, round a right angle hardly."""

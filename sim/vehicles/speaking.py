@@ -9,14 +9,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from adapters.mavlink_frames import Frame, FrameEncoder, fields, message_name
 from adapters.mission_server import Said
 from sim.sensors import stream
 from sim.vehicles.answering import HEARD, SET_MODE, Answerer
-from sim.vehicles.motion import Moment, Vehicle
+from sim.vehicles.motion import Vehicle
 from sim.vehicles.sayings import Sayings
 from sim.vehicles.sensing import SensorErrors, Sensors
 from sim.vehicles.telling import Teller
@@ -70,15 +69,3 @@ class Speaker:
 def sensors_of(seed: int, system: int, errors: SensorErrors | None = None) -> Sensors:
     """The sensors of one vehicle of a world of this seed."""
     return Sensors(errors or SensorErrors(), stream(seed, "sensors", system))
-
-
-def fly(speaker: Speaker, until_s: float) -> Iterator[tuple[Moment, list[bytes]]]:
-    """Step a vehicle until a time of its own, and give each moment with what is said then.
-
-    Every step is one: 50 a second for what flies.
-    """
-    vehicle = speaker.vehicle
-    start = vehicle.moment.time_s
-    while vehicle.moment.time_s < until_s - 1e-9:
-        moment = vehicle.step()
-        yield moment, speaker.say(round((moment.time_s - start) * 1e9))
