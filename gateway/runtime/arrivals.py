@@ -16,10 +16,10 @@ from pyproj import Proj
 from gateway.offline.flows import Track, cleaned
 from gateway.runtime.archived import read_table
 from gateway.runtime.sessions import mend
+from gateway.settings.tables import FOOT_M
 
 Floats = NDArray[np.float64]
 
-FOOT_M = 0.3048
 LEAST_POINTS, LEAST_S = 30, 60.0  # fewer or shorter is no arrival
 _NEEDED = ("timestamp", "latitude", "longitude", "altitude")
 _NAMES = ("fid", "flight_id", "callsign", "icao24")  # what tells flights apart, the best first

@@ -28,9 +28,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gateway.settings.reading import SiteError, check_tables, line_of, read_row, read_table, read_toml
-from gateway.settings.tables import Table, number, text
-
-FOOT_M = 0.3048
+from gateway.settings.tables import FOOT_M, Table, number, text
 
 
 @dataclass(frozen=True, slots=True)

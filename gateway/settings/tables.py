@@ -12,6 +12,8 @@ from gateway.settings.site import encloses
 
 Convert = Callable[[Any], Any]
 
+FOOT_M = 0.3048
+
 
 def number(low: float = -math.inf, high: float = math.inf, *, scale: float = 1.0) -> Convert:
     """A number between two bounds, times a scale."""

@@ -13,6 +13,7 @@ from gateway.offline.report import Approach
 from gateway.offline.touchdown import Touchdown
 from gateway.register import Remembered
 from gateway.settings import Site
+from gateway.settings.tables import FOOT_M
 from gateway.sinks.report_plots import Band, Line, Mark, plot
 
 _TRACK, _TRUTH, _LIMIT, _PATH = "#c62828", "#555555", "#dfe7f1", "#1565c0"
@@ -129,7 +130,7 @@ def _plots(site: Site, one: Approach) -> list[str]:
 def _gates(one: Approach) -> str:
     rows = [
         (
-            f"{gate.which}, {gate.height_m:.0f} m ({gate.height_m / 0.3048:.0f} ft)",
+            f"{gate.which}, {gate.height_m:.0f} m ({gate.height_m / FOOT_M:.0f} ft)",
             f"{gate.distance_m / 1000.0:.2f} km",
             f"{gate.above_m:+.1f} m",
             f"{gate.left_m:+.1f} m",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gateway.settings import Site
+from gateway.settings.tables import FOOT_M
 
 Colour = tuple[int, int, int] | tuple[int, int, int, int]
 
@@ -89,13 +90,13 @@ class Units:
 SI = Units()
 AVIATION = Units(
     length="ft",
-    lengths=1.0 / 0.3048,
+    lengths=1.0 / FOOT_M,
     distance="NM",
     distances=1.0 / 1852.0,
     speed="kn",
     speeds=3600.0 / 1852.0,
     climb="ft/min",
-    climbs=60.0 / 0.3048,
+    climbs=60.0 / FOOT_M,
     tick_m=5.0 * 1852.0,
     ticks=5,
 )
