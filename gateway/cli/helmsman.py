@@ -45,6 +45,7 @@ def _helmsman(settings: list[str]) -> Helmsman:
     from sim.ships.helmsman import Helmsman
     from sim.ships.hull import Hull
     from sim.ships.track_control import LAWS, TrackControl
+    from sim.ships.voyage import STEP_S
     from sim.ships.waves import Waves
 
     said = dict(zip(_SETTINGS, ("pid", "course", "0"), strict=True))
@@ -63,4 +64,4 @@ def _helmsman(settings: list[str]) -> Helmsman:
     if not 0.0 <= sigma_deg <= 20.0:
         raise UsageError(f"--set waves_deg={said['waves_deg']}: must be 0 to 20 degrees of yawing; 0 is no filter.")
     sea = Waves(sigma_rad=math.radians(sigma_deg)) if sigma_deg else None
-    return Helmsman(build_autopilot(said["autopilot"], Hull(), sea), TrackControl(said["track"]))
+    return Helmsman(build_autopilot(said["autopilot"], Hull(), sea, STEP_S), TrackControl(said["track"]))

@@ -162,7 +162,7 @@ def steer(
     return np.clip(order, -limit, limit), Memory(memory.rudder_rad, helm, memory.filtered)
 
 
-def build_autopilot(kind: str, hull: Hull, sea: Waves | None = None, step_s: float = 0.2) -> Autopilot:
+def build_autopilot(kind: str, hull: Hull, sea: Waves | None, step_s: float) -> Autopilot:
     """One of `KINDS` for a hull, with a filter of the sea's waves where one is given.
 
     The mechanical one answers a degree with a degree. Raises ValueError for another kind.

@@ -30,9 +30,12 @@ from adapters.mavlink_frames import Frame, fields
 from adapters.mission_client import MISSION_COUNT, QUIET_NS, Ask, MissionClient
 from sim.ships.autopilots import Autopilot, Memory, listen, steer
 from sim.ships.track_control import Along, Route, TrackControl, is_arrived, wanted_heading
+from sim.ships.vessel import MODES, WAYPOINT_RADIUS_M
+from sim.ships.voyage import STEP_S
 from sim.vehicles.flying import SURFACE_BOAT
+from sim.vehicles.missions import LAST_NAVIGATION, RETURN_HOME
 from sim.vehicles.motion import Home
-from sim.vehicles.steering import Plane
+from sim.vehicles.steering import Plane, distance_m
 
 Floats = NDArray[np.float64]
 
@@ -43,8 +46,7 @@ ATTITUDE, _attitude = fields("ATTITUDE", "time_boot_ms", "yaw", "yawspeed")
 ITEM, _item = fields("MISSION_ITEM_INT", "x", "y", "z", "seq", "command")
 ACK, _ = fields("MISSION_ACK", "type", "target_system")
 _ARM, _SET_MODE, _CUSTOM_MODE, _ARMED = 400, 176, 1, 128
-MANUAL, HOLD = 0, 4
-_NAVIGATION = 95  # MAV_CMD_NAV_LAST
+MANUAL, HOLD = MODES["MANUAL"], MODES["HOLD"]
 FULL = 1000
 
 
@@ -54,8 +56,8 @@ class Helmsman:
 
     autopilot: Autopilot
     control: TrackControl = TrackControl()
-    waypoint_m: float = 30.0
-    step_s: float = 0.2
+    waypoint_m: float = WAYPOINT_RADIUS_M
+    step_s: float = STEP_S
     ship: int | None = None
     is_done: bool = False
     is_at_the_helm: bool = False
@@ -125,7 +127,9 @@ class Helmsman:
             return []
         if frame.message == ITEM:
             latitude, longitude, _, number, command = _item(frame.payload)
-            if command <= _NAVIGATION and (latitude, longitude) != (0, 0):
+            if command == RETURN_HOME and 0 in self._items:
+                self._items[number] = self._items[0]
+            elif command <= LAST_NAVIGATION and (latitude, longitude) != (0, 0):
                 self._items[number] = (math.radians(latitude / 1e7), math.radians(longitude / 1e7))
         asks.hear(frame.message, frame.payload, now_ns)
         answers = self.due(now_ns)
@@ -136,9 +140,14 @@ class Helmsman:
     def _lay_route(self) -> None:
         places = [self._items[number] for number in sorted(self._items)]
         self._plane = Plane.about(Home(*places[0], 0.0))
-        spots = [self._plane.spot(*place, 0.0) for place in places]
-        self._route = Route(np.array([[spot.east_m, spot.north_m] for spot in spots]), self.waypoint_m)
-        self.notes.append(f"Her mission has {len(places) - 1} places to go to.")
+        spots = [self._plane.spot(*places[0], 0.0)]
+        for place in places[1:]:
+            spot = self._plane.spot(*place, 0.0)
+            if distance_m(spots[-1], spot) > 1.0:  # a leg has a course
+                spots.append(spot)
+        if len(spots) > 1:
+            self._route = Route(np.array([[spot.east_m, spot.north_m] for spot in spots]), self.waypoint_m)
+        self.notes.append(f"Her mission has {len(spots) - 1} places to go to.")
 
     def _hear_position(self, payload: bytes) -> None:
         time_ms, latitude, longitude, north_cmps, east_cmps = _position(payload)

@@ -49,7 +49,7 @@ Floats = NDArray[np.float64]
 
 MODES = {"MANUAL": 0, "HOLD": 4, "AUTO": 10, "RTL": 11, "GUIDED": 15}  # ArduPilot Rover's
 _ENGINE_S = 60.0  # how slowly the speed follows the engine
-_WAYPOINT_RADIUS_M = 30.0
+WAYPOINT_RADIUS_M = 30.0
 
 
 @dataclass
@@ -78,7 +78,7 @@ class Vessel:
     throttle: float = 0.0
 
     def __post_init__(self) -> None:
-        self.settings = {"CRUISE_SPEED": self.hull.speed_mps, "WP_RADIUS": _WAYPOINT_RADIUS_M} | self.settings
+        self.settings = {"CRUISE_SPEED": self.hull.speed_mps, "WP_RADIUS": WAYPOINT_RADIUS_M} | self.settings
         self.plane, self._body = Plane.about(self.home), Body.at(self.home)
         self._ship = Ship.under_way((), 0.0, self.home.heading_rad)
         self._memory: Memory = self.autopilot.start(self._ship.heading_rad)

@@ -43,7 +43,7 @@ def test_norrbins_term_makes_the_steady_rate_smaller() -> None:
 def test_a_batch_of_ships_sails_as_each_alone() -> None:
     """Three speeds at once have the bits of each by itself."""
     speeds = np.array([3.0, 7.7, 12.0])
-    autopilot = build_autopilot("adaptive", HULL, Waves())
+    autopilot = build_autopilot("adaptive", HULL, Waves(), STEP_S)
     together = make_voyage(HULL, Ship.under_way((3,), speeds), autopilot, Sea(), 60.0, heading_rad=1.0)
     for place, speed in enumerate(speeds):
         alone = make_voyage(HULL, Ship.under_way((), speed), autopilot, Sea(), 60.0, heading_rad=1.0)
@@ -133,7 +133,7 @@ def test_a_wave_filters_gain_is_the_one_a_kalman_filter_ends_with() -> None:
 )
 def test_each_rule_has_its_case(error_deg: float, rate_degps: float, rudder_deg: float, rule: str) -> None:
     """A helmsman's situations, to either side, and the rule that answers each."""
-    law = build_autopilot("expert", HULL).law
+    law = build_autopilot("expert", HULL, None, STEP_S).law
     assert isinstance(law, Expert)
     angles = (np.radians(one) for one in (error_deg, rate_degps))
     seen = Steering(*angles, np.array(7.7), np.radians(rudder_deg), np.zeros(()))

@@ -6,12 +6,18 @@ import math
 
 import pytest
 
+from adapters.mavlink_frames import Frame, FrameEncoder, parse
 from adapters.mission_writing import MissionItem
+from sim.ships.autopilots import build_autopilot
 from sim.ships.fitting_out import vessel
-from sim.ships.hull import Weather
+from sim.ships.helmsman import Helmsman
+from sim.ships.hull import Hull, Weather
+from sim.ships.linked import ShipSpeaker
 from sim.ships.vessel import Vessel
+from sim.ships.voyage import STEP_S
 from sim.ships.waves import Waves
 from sim.vehicles.motion import Arm, ChangeSpeed, GoTo, GoToItem, Home, SetMode, TakeOff
+from sim.vehicles.speaking import sensors_of
 from sim.vehicles.steering import distance_m
 
 HOME = Home(math.radians(31.0), math.radians(122.0), 5.0)
@@ -20,6 +26,12 @@ PLACES = ((1500.0, 0.0), (2500.0, 1500.0))  # north, east
 
 def _item(north_m: float, east_m: float) -> MissionItem:
     return MissionItem(16, 31.0 + north_m / 110_860.0, 122.0 + east_m / 95_500.0, 0.0)
+
+
+def _parsed(raw: bytes) -> Frame:
+    frame = parse(raw)
+    assert frame is not None
+    return frame
 
 
 def _under_way(**fitted: object) -> Vessel:
@@ -97,6 +109,27 @@ def test_a_mission_that_ends_with_the_return_home_ends_there() -> None:
     assert ship.mission.reached == [1, 2, 3]
     home = ship.plane.spot(HOME.latitude_rad, HOME.longitude_rad, 5.0)
     assert distance_m(ship.plane.spot(moment.latitude_rad, moment.longitude_rad, 5.0), home) < 60.0
+
+
+def test_a_helmsman_takes_a_ship_there_and_home_again() -> None:
+    """Over MAVLink, by a mission that names one place twice and ends with the return home."""
+    out = _item(300.0, 0.0)
+    ship = vessel(HOME, (out, out, MissionItem(20)))
+    speaker = ShipSpeaker.of(1, ship, sensors_of(1, 1), 0)
+    helmsman = Helmsman(build_autopilot("pid", Hull(), None, STEP_S))
+    voice = FrameEncoder(253, 191)
+    while not helmsman.is_done and ship.moment.time_s < 600.0:
+        now = round(ship.step().time_s * 1e9)
+        asks, frames = helmsman.due(now), speaker.say(now)
+        while asks or frames:
+            asks += [ask for frame in frames for ask in helmsman.hear(_parsed(frame), now)]
+            said = [_parsed(voice.encode(name, **values)) for name, values in asks]
+            asks, frames = [], [frame for one in said for frame in speaker.hear(one, now)]
+    assert helmsman.is_done
+    assert "Her mission has 2 places to go to." in helmsman.notes
+    assert ship.mission.reached == [1, 2, 3]
+    spot = ship.plane.spot(ship.moment.latitude_rad, ship.moment.longitude_rad, 5.0)
+    assert abs(spot.north_m) < 20.0  # abeam of home: a leg of 300 m is too short to come out of so tight a turn
 
 
 def test_a_ship_without_a_way_does_not_go() -> None:
