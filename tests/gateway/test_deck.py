@@ -165,17 +165,17 @@ def test_waves_hardly_move_the_deck(world: Any) -> None:
 
 
 def test_ticks_do_not_move_the_deck(world: Any) -> None:
-    """One arrival at a time, in ticks of 20 ms and all at once: the same rows, poses and sentences, bit for bit."""
-    told, here = _aboard(world, 0.3, silent_from_s=10.0, yaws_deg=2.0)[:130], world.with_site(SITE)
-    runs = [here.run(told, ticks=ticks, until_s=44.0, options=LIGHT) for ticks in ("one", "20 ms", "all")]
+    """One arrival at a time and all at once: the same rows, poses and sentences, bit for bit."""
+    told, here = _aboard(world, 0.3, silent_from_s=10.0, yaws_deg=2.0)[:90], world.with_site(SITE)
+    runs = [here.run(told, ticks=ticks, until_s=36.0, options=LIGHT) for ticks in ("one", "all")]
     poses = [
         [(pose.at, pose.enu_m.tobytes(), pose.deck_from_enu.tobytes()) for one in run.pictures for pose in one.deck]
         for run in runs
     ]
-    assert len(poses[0]) > 35
-    assert poses[0] == poses[1] == poses[2]
-    assert runs[0].bits() == runs[1].bits() == runs[2].bits()
-    assert [(e.at, e.text) for e in runs[0].events] == [(e.at, e.text) for e in runs[2].events]
+    assert len(poses[0]) > 30
+    assert poses[0] == poses[1]
+    assert runs[0].bits() == runs[1].bits()
+    assert [(e.at, e.text) for e in runs[0].events] == [(e.at, e.text) for e in runs[1].events]
 
 
 def test_a_ship_that_is_lost_is_carried_on_and_that_is_said(world: Any) -> None:
