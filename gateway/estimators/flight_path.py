@@ -22,19 +22,60 @@ _GAS_J_PER_KG_K = 287.052_87
 _LAPSE_K_PER_M = 0.0065
 _EXPONENT = 9.806_65 / (_GAS_J_PER_KG_K * _LAPSE_K_PER_M)
 SMOOTHED_OVER_S, SHORTEST_S = 3.0, 60.0  # of airspeed before it is held against the thresholds; of a sortie
+CLIMB_OVER_S = 10.0  # a barometer's noise is a twentieth of a metre a second in so long
 _MOST_KNOTS = 400  # of the wind: the normal equations are dense
 
 
-def air_velocity(true_airspeed_mps: ArrayLike, compass_heading_rad: ArrayLike, pitch_rad: ArrayLike) -> Floats:
-    """East, north, up (..., 3) in m/s through the air of an aircraft that flies where its nose points.
+def air_velocity(
+    true_airspeed_mps: ArrayLike,
+    compass_heading_rad: ArrayLike,
+    pitch_rad: ArrayLike,
+    roll_rad: ArrayLike = 0.0,
+    angle_of_attack_rad: ArrayLike = 0.0,
+) -> Floats:
+    """East, north, up (..., 3) in m/s through the air of an aircraft that flies where its nose points, or below it.
 
-    Roll turns the aircraft about its own velocity and drops out. Source: 002-2 1.1.
+    Without an angle of attack roll turns the aircraft about its own velocity and drops out. Source: 002-2 1.1. Deviation: with
+    one, a banked aircraft also flies to the side of where its nose points.
     """
-    speed, heading, pitch = (
-        np.asarray(one, dtype=np.float64) for one in (true_airspeed_mps, compass_heading_rad, pitch_rad)
+    speed, heading, pitch, roll, attack = (
+        np.asarray(one, dtype=np.float64)
+        for one in (true_airspeed_mps, compass_heading_rad, pitch_rad, roll_rad, angle_of_attack_rad)
     )
-    level = speed * np.cos(pitch)
-    return np.stack([level * np.sin(heading), level * np.cos(heading), speed * np.sin(pitch)], axis=-1)
+    forward, below = speed * np.cos(attack), speed * np.sin(attack)
+    ahead = forward * np.cos(pitch) + below * np.cos(roll) * np.sin(pitch)
+    right = -below * np.sin(roll)
+    up = forward * np.sin(pitch) - below * np.cos(roll) * np.cos(pitch)
+    east, north = (
+        ahead * np.sin(heading) + right * np.cos(heading),
+        ahead * np.cos(heading) - right * np.sin(heading),
+    )
+    return np.stack(np.broadcast_arrays(east, north, up), axis=-1)
+
+
+def angle_of_attack(
+    true_airspeed_mps: ArrayLike, climb_mps: ArrayLike, pitch_rad: ArrayLike, roll_rad: ArrayLike
+) -> Floats:
+    """By how much the nose points above where the aircraft flies, rad: what leaves it the climb that its height shows.
+
+    An error of the pitch, such as of a unit that is not mounted level, is in it and does not matter. Bounded by 17 degrees.
+    """
+    speed, climb, pitch, roll = (
+        np.asarray(one, dtype=np.float64) for one in (true_airspeed_mps, climb_mps, pitch_rad, roll_rad)
+    )
+    along, across = np.sin(pitch), np.cos(roll) * np.cos(pitch)
+    rises = climb / np.maximum(speed, 1.0) / np.maximum(np.hypot(along, across), 1e-9)
+    return np.asarray(np.clip(np.arccos(np.clip(rises, -1.0, 1.0)) - np.arctan2(across, along), -0.3, 0.3))
+
+
+def attack_by_height(
+    time_s: Floats, height_m: Floats, true_airspeed_mps: Floats, pitch_rad: Floats, roll_rad: Floats
+) -> Floats:
+    """`angle_of_attack` (n,) by how the height (n,) changes about each instant, smoothed."""
+    later = np.minimum(time_s + 0.5 * CLIMB_OVER_S, time_s[-1])
+    earlier = np.maximum(time_s - 0.5 * CLIMB_OVER_S, time_s[0])
+    climb = (np.interp(later, time_s, height_m) - np.interp(earlier, time_s, height_m)) / (later - earlier)
+    return smoothed(time_s, angle_of_attack(true_airspeed_mps, climb, pitch_rad, roll_rad), CLIMB_OVER_S)
 
 
 def integrated(time_s: Floats, velocity_mps: Floats) -> Floats:

@@ -152,7 +152,11 @@ def _sortie(flown: Flown, first: int, end: int, take_off_mps: float, places: tup
     compass = flown.compass_rad[part] - (0.0 if math.isnan(bias[0]) else bias[0])
     pressure, height, height_by = _heights(flown, part)
     speed = paths.true_airspeed(flown.airspeed_mps[part], pressure, flown.temperature_k[part])
-    velocity = paths.air_velocity(speed, compass, flown.pitch_rad[part])
+    pitch, roll = flown.pitch_rad[part], flown.roll_rad[part]
+    velocity = paths.air_velocity(speed, compass, pitch)
+    if height is not None:
+        attack = paths.attack_by_height(time_s, height, speed, pitch, roll)
+        velocity[:, :2] = paths.air_velocity(speed, compass, pitch, roll, attack)[:, :2]
     lift_off = how.lift_off or _nearest_place(places, int(time[0]))
     through_air = (
         paths.integrated(time_s, velocity) if lift_off is None else paths.on_earth(time_s, velocity, lift_off[0])
@@ -170,8 +174,8 @@ def _sortie(flown: Flown, first: int, end: int, take_off_mps: float, places: tup
         sigma_m=carried.sigma_m,
         height_m=height,
         wind_mps=carried.wind_mps,
-        roll_rad=flown.roll_rad[part],
-        pitch_rad=flown.pitch_rad[part],
+        roll_rad=roll,
+        pitch_rad=pitch,
         compass_rad=compass,
         true_airspeed_mps=speed,
         end_error_m=math.nan if target is None else float(np.linalg.norm(through_air[-1, :2] - target)),

@@ -61,6 +61,16 @@ def test_roll_changes_nothing() -> None:
         np.testing.assert_allclose(rolled @ forward * 50.0, paths.air_velocity(50.0, heading, pitch), atol=1e-12)
 
 
+@pytest.mark.parametrize("roll", [-0.7, 0.0, 0.5])
+def test_the_climb_tells_the_angle_of_attack_and_where_a_banked_aircraft_flies(roll: float) -> None:
+    """Six degrees at 40 degrees of bank: it flies four degrees to the side of its nose."""
+    velocity = paths.air_velocity(50.0, 0.7, 0.2, roll, 0.1)
+    assert np.linalg.norm(velocity) == pytest.approx(50.0)
+    assert paths.angle_of_attack(50.0, velocity[2], 0.2, roll) == pytest.approx(0.1)
+    aside = math.atan2(velocity[0], velocity[1]) - 0.7
+    assert aside == pytest.approx(-0.1 * math.sin(roll), abs=0.005)
+
+
 def test_the_height_is_that_of_the_pressure() -> None:
     """Two degrees of angle of attack are kilometres by pitch, hundreds of metres once closed, metres by pressure."""
     figures: dict[str, float] = {}
@@ -101,7 +111,9 @@ def test_a_landing_flight_of_sitl_is_rebuilt_within_a_hundredth_of_its_length(na
 
 @pytest.mark.skipif(not DATA.exists(), reason="the recordings are not beside the project")
 def test_a_real_flight_in_a_wind_that_doubles_is_rebuilt() -> None:
-    """2 % are asked for. The wind grew from 4 to 8.5 m/s while 17 m/s were flown: 2.0 to 2.1 %, and 1.5 % with two fixes."""
+    """2 % are asked for. The wind grew from 4 to 8.5 m/s while 17 m/s were flown: closed on lift-off 2.01 %, on where it touched
+    down, 8 m beside it, 1.96 %; half of that and less with three stretches of two seconds of positions.
+    """
     flown = loadmat(DATA / "fixed-wing-thor75.mat", squeeze_me=True, struct_as_record=False)["flight_data"]
     parameters = Parameters()
     for place in range(0, len(flown.time), 5):
@@ -115,7 +127,12 @@ def test_a_real_flight_in_a_wind_that_doubles_is_rebuilt() -> None:
             parameters.take(GpsReport("thor", at, at, *where, altitude_msl_m=float(flown.navalt[place])))
     (sortie,) = reconstructed(parameters)
     assert sortie.compared is not None
-    assert sortie.compared.rmse_m < 0.0215 * sortie.compared.length_m
+    assert sortie.compared.rmse_m < 0.0203 * sortie.compared.length_m
+    touchdown = int(np.argmin(np.abs(flown.time - (int(sortie.time[-1]) - 1_700_000_000 * 10**9) / 1e9)))
+    there = float(flown.navlat[touchdown]), float(flown.navlon[touchdown])
+    (closed,) = reconstructed(parameters, How(close_on=there))
+    assert closed.compared is not None
+    assert closed.compared.rmse_m < 0.02 * closed.compared.length_m
     third = (sortie.time[-1] - sortie.time[0]) // 3
     muted = tuple(
         (int(sortie.time[0] + k * third + 2 * 10**9), int(sortie.time[0] + (k + 1) * third)) for k in range(3)
