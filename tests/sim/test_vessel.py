@@ -21,7 +21,7 @@ from sim.vehicles.speaking import sensors_of
 from sim.vehicles.steering import distance_m
 
 HOME = Home(math.radians(31.0), math.radians(122.0), 5.0)
-PLACES = ((1500.0, 0.0), (2500.0, 1500.0))  # north, east
+PLACES = ((800.0, 0.0), (1400.0, 800.0))  # north, east
 
 
 def _item(north_m: float, east_m: float) -> MissionItem:
