@@ -8,7 +8,6 @@ from enum import IntEnum
 
 from gateway import associate, fuse, predict, track
 from gateway.align import SECOND
-from gateway.associate import Association
 from gateway.associating import Associating
 from gateway.fuse import Lane
 from gateway.fuse.consistency import Finding
@@ -16,7 +15,6 @@ from gateway.making import NAMED_AT_MOST
 from gateway.observation import Attitude, Heard
 from gateway.picture import Event
 from gateway.register import WAIT_NS, gathered, residuals
-from gateway.track import RadarTracks
 
 PLOT_MARGIN_S = 4.0  # plots are remembered this much longer than reports: a report's check looks back over them
 
@@ -44,8 +42,6 @@ READING_LANES = tuple(
 
 class Work(Associating):
     """The stages of one step; lives only inside `pipeline.step`, which calls them in order for each arrival."""
-
-    # what happens by itself ---------------------------------------------------------------------------------------
 
     def instants_until(self, arrival: Heard) -> Iterator[int]:
         """The instants before an arrival at which register or predict have their turn, with a watermark also at its very one.
@@ -188,7 +184,7 @@ class Work(Associating):
         self.lanes, ended = fuse.emptied(was, now)
         self.settled += fuse.settled(was, self.lanes)
         self.ended += ended
-        self.tracks, self.association = RadarTracks(), Association()
+        self.tracks, self.association = track.RadarTracks(), associate.Association()
         self.unnumbered = self.unnumbered.emptied()
         self.reckoners = self.reckoners.emptied()
         self.registration = self.registration.again(now)

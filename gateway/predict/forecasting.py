@@ -80,13 +80,8 @@ def forecast(
     goals = goals if predicting.flows is None else predicting.flows.along(goals, state)
     goals = weather.around(goals, state, weather.areas(predicting.tellings, site, frame, at, separation_m))
     predicting, stacked = predicting.stacked(lanes[0].track, goals)
-    usual = level_turn_rate(state.speed, site.estimation.bank_rad, site.estimation.turn_rate_rps)
     winds = _winds(predicting, lanes, at)
-    through_air = np.sqrt(((state.velocity - winds) ** 2).sum(axis=1))
-    adapts = _adapts(stacked, at, state)
-    now, minds = motions(
-        before, at, state.position, state.velocity, state.velocity_sigma, state.sides, usual, through_air, adapts
-    )
+    now, minds = _motions(before, at, state, stacked, winds, site)
     way, minds = chosen(before, minds, at, now, stacked, state.climb, frame)
     horizons = state.since_s[:, None] + np.array(horizons_s)
     around = beside(horizons)
@@ -123,6 +118,14 @@ def forecast(
         weighed(at, numbers, goals, way.share),
     )
     return replace(predicting, remembered=predicting.remembered.after(tracks, minds), gates=gates), made
+
+
+def _motions(before: Minds, at: int, state: State, goals: Stacked, winds: Floats, site: Site) -> tuple[Motions, Minds]:
+    """How n aircraft move now, in winds (n, 2), and what is remembered of that."""
+    usual = level_turn_rate(state.speed, site.estimation.bank_rad, site.estimation.turn_rate_rps)
+    through_air = np.sqrt(((state.velocity - winds) ** 2).sum(axis=1))
+    adapts, sigma = _adapts(goals, at, state), state.velocity_sigma
+    return motions(before, at, state.position, state.velocity, sigma, state.sides, usual, through_air, adapts)
 
 
 def _adapts(goals: Stacked, at: int, state: State) -> Bools:

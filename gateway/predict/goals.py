@@ -65,23 +65,10 @@ class Goals:
 
 def goals_of(told: Told | None, site: Site, frame: RunwayFrame, separation_m: float) -> Goals:
     """What is known of one aircraft's goals; `separation_m` lifts altitudes above mean sea level."""
-    route, up = np.full((COUNT, LEGS, 2), math.nan), np.full((COUNT, LEGS), math.nan)
-    names: list[str | None] = [None] * COUNT
-    planned, circles = np.zeros(COUNT, dtype=np.bool_), np.zeros(COUNT, dtype=np.bool_)
-    lands, over = np.zeros((COUNT, LEGS), dtype=np.bool_), np.zeros((COUNT, LEGS), dtype=np.bool_)
-    aim, beyond = turn(frame.enu_from_runway, runway_goals(site.runway))
-    route[RUNWAY, 0], up[RUNWAY, 0], names[RUNWAY], lands[RUNWAY, 0] = aim[:2], aim[2], "runway", True
-    route[GO_AROUND, 0], names[GO_AROUND] = beyond[:2], "go-around"
-    for slot, waypoint in zip(PUBLISHED, site.waypoints, strict=False):
-        route[slot, 0] = frame.enu_from_geodetic(waypoint.latitude_rad, waypoint.longitude_rad, site.runway.height_m)[
-            :2
-        ]
-        names[slot] = waypoint.name
-    none = np.full((COUNT, LEGS), math.nan)
+    goals = _of_site(site, frame)
     if told is None:
-        return Goals(
-            route, up, tuple(names), planned, lands, circles, circles, none, none, lands & False, np.full(2, math.nan)
-        )
+        return goals
+    route, up, names, circles, rounds = goals.route, goals.up, list(goals.names), goals.circles, goals.rounds
     declared, points, home_m = told.declared, _points(told.plan), _home_m(told.plan)
     begins = np.full(2, math.nan)
     if declared is not None and declared.sequence is not None:
@@ -91,30 +78,29 @@ def goals_of(told: Told | None, site: Site, frame: RunwayFrame, separation_m: fl
             begins = _place(passed[-1], home_m, separation_m, site, frame)[:2]
     count, points = len(points), [*points, *_afterwards(told, points)]
     places = [_place(point, home_m, separation_m, site, frame) for point in points[: len(PLANNED) + LEGS]]
-    rounds = np.zeros(COUNT, dtype=np.bool_)
-    radius, least = np.full((COUNT, LEGS), math.nan), np.zeros((COUNT, LEGS))
     for slot in PLANNED[:count]:
         following = _until_a_circle(places[slot : slot + LEGS], points[slot : slot + LEGS])
         last = points[slot + len(following) - 1]
         rounds[slot] = last.kind == "loiter" and last.radius_m is None
         for leg, point in enumerate(points[slot : slot + len(following)]):
             if point.kind == "loiter" and point.radius_m is not None:
-                radius[slot, leg] = -point.radius_m
-                least[slot, leg] = math.inf if point.turns is None else point.turns * FULL_TURN
+                goals.radius[slot, leg] = -point.radius_m
+                goals.least[slot, leg] = math.inf if point.turns is None else point.turns * FULL_TURN
         route[slot, : len(following)] = [enu[:2] for enu in following]
         up[slot, : len(following)] = [enu[2] for enu in following]
-        over[slot, : len(following)] = [
+        goals.over[slot, : len(following)] = [
             place == count - 1 < len(places) - 1 for place in range(slot, slot + len(following))
         ]
-        lands[slot, : len(following)] = [point.kind == "landing" for point in points[slot : slot + len(following)]]
-        names[slot], planned[slot] = f"{points[slot].kind} {points[slot].sequence}", True
+        kinds = [point.kind for point in points[slot : slot + len(following)]]
+        goals.lands[slot, : len(following)] = [kind == "landing" for kind in kinds]
+        names[slot], goals.planned[slot] = f"{points[slot].kind} {points[slot].sequence}", True
         circles[slot] = points[slot].kind == "loiter"
     if told.plan is not None and told.plan.points and told.plan.points[0].kind == "home":
         enu = _place(told.plan.points[0], home_m, separation_m, site, frame)
         route[HOME, 0], names[HOME] = enu[:2], HOME_NAME
         if told.status is not None and returning(told.status):
             circles[HOME] = rounds[HOME] = circles_at_home(told.status)
-            lands[HOME, 0] = not circles[HOME]
+            goals.lands[HOME, 0] = not circles[HOME]
     chosen = _declared(declared, points, names)
     if chosen == DECLARED and declared is not None:
         place = _declared_place(declared, separation_m, site, frame)
@@ -124,7 +110,24 @@ def goals_of(told: Told | None, site: Site, frame: RunwayFrame, separation_m: fl
             (route[DECLARED, 0], up[DECLARED, 0]), names[DECLARED] = place, _called(declared)
     since = declared.valid_at if declared is not None else 0
     begins = begins if chosen == PLANNED[0] else np.full(2, math.nan)
-    return Goals(route, up, tuple(names), planned, lands, circles, rounds, radius, least, over, begins, chosen, since)
+    return replace(goals, names=tuple(names), begins=begins, declared=chosen, declared_at=since)
+
+
+def _of_site(site: Site, frame: RunwayFrame) -> Goals:
+    """The goals of who has said nothing: the runway, beyond it, and the published points."""
+    route, up = np.full((COUNT, LEGS, 2), math.nan), np.full((COUNT, LEGS), math.nan)
+    names: list[str | None] = [None] * COUNT
+    lands = np.zeros((COUNT, LEGS), dtype=np.bool_)
+    aim, beyond = turn(frame.enu_from_runway, runway_goals(site.runway))
+    route[RUNWAY, 0], up[RUNWAY, 0], names[RUNWAY], lands[RUNWAY, 0] = aim[:2], aim[2], "runway", True
+    route[GO_AROUND, 0], names[GO_AROUND] = beyond[:2], "go-around"
+    for slot, waypoint in zip(PUBLISHED, site.waypoints, strict=False):
+        there = frame.enu_from_geodetic(waypoint.latitude_rad, waypoint.longitude_rad, site.runway.height_m)
+        route[slot, 0], names[slot] = there[:2], waypoint.name
+    planned, circles, rounds = np.zeros((3, COUNT), dtype=np.bool_)
+    radius, least, over = np.full(lands.shape, math.nan), np.zeros(lands.shape), np.zeros_like(lands)
+    nowhere = np.full(2, math.nan)
+    return Goals(route, up, tuple(names), planned, lands, circles, rounds, radius, least, over, nowhere)
 
 
 def _until_a_circle(places: list[Floats], points: Sequence[PlanPoint]) -> list[Floats]:
