@@ -97,7 +97,7 @@ def test_flows_are_written_for_predictions_and_found_beside_sessions_of_their_ai
     assert flows_near(tmp_path / "nothing", DEMO_SITE) == ()
 
 
-@pytest.mark.parametrize("spoil", ["{", '{"format": "x"}', "latitude_deg", "points"])
+@pytest.mark.parametrize("spoil", ["{", '{"format": "x"}', "latitude_deg", "points", "number"])
 def test_a_file_of_flows_that_is_damaged_is_a_sentence(tmp_path: Path, spoil: str) -> None:
     """Whatever stands in it."""
     path = write_ways([flow()], (49.0, 2.5), tmp_path)
@@ -106,6 +106,8 @@ def test_a_file_of_flows_that_is_damaged_is_a_sentence(tmp_path: Path, spoil: st
         document["flows"][0]["points"][0][spoil] = 270.0
     elif spoil == "points":
         document["flows"][0][spoil] = []
+    elif spoil == "number":
+        document["flows"][0][spoil] = math.inf
     path.write_text(spoil if spoil.startswith("{") else json.dumps(document))
     with pytest.raises(FlowsError, match=r"flows\.json"):
         read_ways(tmp_path)
