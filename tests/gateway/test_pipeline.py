@@ -58,7 +58,7 @@ def _measured(rows: dict[Any, dict[str, Any]]) -> dict[Any, dict[str, Any]]:
 # ticks ----------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("weighting", WEIGHTINGS)
+@pytest.mark.parametrize("weighting", ["bias", "literal"])
 def test_how_arrivals_fall_into_ticks_changes_no_bit(busy: tuple[Any, list[Observation]], weighting: Weighting) -> None:
     """Ticks of one arrival, of 20 ms with watermarks, and one of everything give equal rows and predictions, to the bit."""
     there, said = busy
@@ -120,8 +120,7 @@ def test_an_arrival_on_a_whole_second_ends_a_silence_the_same_way(world: Any, be
 # late and shuffled ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("weighting", WEIGHTINGS)
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(("weighting", "seed"), [("bias", 1), ("covariance", 1), ("innovation", 2), ("literal", 2)])
 def test_shuffled_within_5_s_is_in_order(
     world: Any, differences: Callable[..., float], weighting: Weighting, seed: int
 ) -> None:

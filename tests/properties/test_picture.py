@@ -106,7 +106,7 @@ def _bits(pictures: Sequence[Picture]) -> list[bytes | list[object]]:
     return parts
 
 
-SMALL = settings(max_examples=16, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+SMALL = settings(max_examples=12, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 
 
 @SMALL
