@@ -235,7 +235,7 @@ def _peak(file: Any, block_bytes: int) -> tuple[int, int]:
 
 def test_in_blocks_a_file_of_any_length_takes_the_memory_of_one_block() -> None:
     part = EXCERPT.read_bytes()
-    many = 12 * (1 << 20) // len(part)
+    many = 20 * (1 << 20) // len(part)
     short, long = (_peak(_Repeated(part, times), 1 << 20) for times in (many // 4, many))
     assert long[0] > 3 * short[0]
     assert long[1] < 1.5 * short[1]  # a file that was held would take four times as much

@@ -281,7 +281,7 @@ def test_whatever_is_said_the_rows_of_the_picture_hold_numbers(said: list[tuple[
 def test_the_fuzzer_finds_nothing_in_a_short_run() -> None:
     script = TESTS / "fuzz" / "run.py"
     run = subprocess.run(
-        [sys.executable, str(script), "--datagrams", "2000", "--files", "13", "--seed", "11"],
+        [sys.executable, str(script), "--datagrams", "3000", "--files", "13", "--seed", "11"],
         capture_output=True, text=True, check=False, timeout=300,
     )  # fmt: skip
     assert run.returncode == 0, run.stdout + run.stderr
