@@ -29,6 +29,7 @@ TYPES_AT_MOST = 10_000  # a bound on what strangers can make us remember
 AHEAD_NS = 3 * SECOND  # a state is carried on so far at most
 TOGETHER = 6  # vehicles of a share: fewer at once cost more each, more hold up what comes
 NOTHING_DUE = 1 << 62
+TOLD_LAST_NS = 60 * SECOND  # who told no place for so long is gone
 
 Waiting = tuple[int, tuple[Observation, ...]]
 """Observations, and what is added to their stamps for the session's time."""
@@ -83,7 +84,7 @@ class Reckoners:
     @property
     def is_idle(self) -> bool:
         """Whether nothing would happen however often it goes on."""
-        return not (self.by_aircraft or self.waiting or self.planned)
+        return not (self.by_aircraft or self.waiting or self.planned or self.told_last)
 
     @property
     def due(self) -> int:
@@ -155,6 +156,7 @@ class Reckoners:
             places=(),
             suspects=(),
             planned=tuple(planned),
+            told_last={name: last for name, last in self.told_last.items() if at - last.at <= TOLD_LAST_NS},
             crowded=self.crowded or len(new) > room,
         )
 

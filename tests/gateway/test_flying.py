@@ -15,7 +15,7 @@ from adapters.decode import Decoder
 from gateway.estimators import inertial as ins
 from gateway.observation import AirData, Attitude, GpsReport, Heard, ImuSample, Many, Observation, VehicleStatus
 from gateway.picture import Picture
-from gateway.reckon import LastPlace
+from gateway.reckon import LastPlace, Reckoners
 from gateway.reckon.flying import flown
 from gateway.reckon.told import Series
 from gateway.runtime.playback import open_playback
@@ -188,3 +188,11 @@ def apart_m(one: GpsReport, latitude_rad: float, longitude_rad: float) -> float:
     """Level, from a place."""
     east = (longitude_rad - one.longitude_rad) * math.cos(latitude_rad)
     return math.hypot(latitude_rad - one.latitude_rad, east) * 6.371e6
+
+
+def test_who_tells_no_place_for_a_minute_is_forgotten() -> None:
+    """What was told last of vehicles that are gone is not kept: of thousands it would be copied with each report."""
+    gone = Reckoners().telling("mavlink:9", LastPlace(0.8, 0.1, 0, 0))
+    assert gone.planning(60 * SECOND).told_last
+    assert not gone.planning(61 * SECOND).told_last
+    assert gone.planning(61 * SECOND).is_idle
