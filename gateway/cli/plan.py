@@ -5,13 +5,15 @@ from __future__ import annotations
 import json as text
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import RunError, UsageError, writing
 from gateway.cli.places import read_place_deg
+from gateway.cli.plan_options import Asked, Flying, Given, Method
+from gateway.cli.spread import spread
 
 if TYPE_CHECKING:
     from adapters.mission_writing import MissionItem
@@ -41,134 +43,76 @@ _BANK_RAD = math.radians(25.0)
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("plan", help=_HELP)(plan)
+    app.command("plan", help=_HELP)(spread(plan))
 
 
 def plan(
-    file: Annotated[
-        Path | None, typer.Argument(metavar="FILE", help="Threats and areas, TOML or JSON.", show_default=False)
-    ] = None,
-    seed: Annotated[
-        int | None,
-        typer.Option(
-            "--seed", metavar="N", help="Draws the threats; with a file, of the annealing.", show_default=False
-        ),
-    ] = None,
-    start: Annotated[
-        str | None,
-        typer.Option("--start", metavar="LAT,LON", help="In place of the file's; or runway.", show_default=False),
-    ] = None,
-    goal: Annotated[
-        str | None,
-        typer.Option("--goal", metavar="LAT,LON", help="In place of the file's; or runway.", show_default=False),
-    ] = None,
-    method: Annotated[
-        str,
-        typer.Option(
-            "--method", metavar="modern|seed|literal", help="modern; the paper's method, read well (seed) or literally."
-        ),
-    ] = "modern",
-    objective: Annotated[
-        str,
-        typer.Option("--objective", metavar="threat|clearance|literal", help="Of the paper's triples, with seed."),
-    ] = "threat",
-    lambda_km4: Annotated[
-        float,
-        typer.Option(
-            "--lambda", metavar="KM4", min=0.0, help="What threat counts: 16 doubles a metre at 2 km from one."
-        ),
-    ] = 16.0,
-    speed: Annotated[float, typer.Option("--speed", metavar="M/S", min=1.0, max=400.0, help="Over the ground.")] = 40.0,
-    turn_radius: Annotated[
-        float | None,
-        typer.Option(
-            "--turn-radius",
-            metavar="M",
-            min=0.0,
-            help="No turn is narrower. (default: 25 degrees of bank at the speed)",
-            show_default=False,
-        ),
-    ] = None,
-    height: Annotated[
-        str, typer.Option("--height", metavar="M[:M]", help="Above home: a level, or a band to choose one from.")
-    ] = "300",
+    asked: Asked = Asked(),
+    method: Method = Method(),
+    flying: Flying = Flying(),
     site: take.SiteOption = None,
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="NAME", help="NAME.plan, NAME.waypoints, NAME.rrd.")
-    ] = Path("route"),
-    upload: Annotated[
-        str | None,
-        typer.Option(
-            "--upload", metavar="URL", help="Give the mission to the vehicle on this link.", show_default=False
-        ),
-    ] = None,
-    vehicle: Annotated[
-        int | None,
-        typer.Option(
-            "--vehicle",
-            metavar="N",
-            min=1,
-            max=250,
-            help="Its MAVLink system. (default: the first)",
-            show_default=False,
-        ),
-    ] = None,
-    quiet: take.QuietOption = False,
-    json: take.JsonOption = False,
+    given: Given = Given(),
+    telling: take.Telling = take.Telling(),
 ) -> None:
     """Plan a route."""
     from gateway.settings import SiteError
-    from sim.earth import GRAVITY_MPS2
-    from sim.planning.flight import Wishes, plan_flight
+    from sim.planning.flight import plan_flight
     from sim.planning.mission import mission
     from sim.planning.task import PlanError
 
-    link = _link(upload, vehicle)
-    radius = speed**2 / (GRAVITY_MPS2 * math.tan(_BANK_RAD)) if turn_radius is None else turn_radius
-    lowest, highest = _read_height(height)
-    wishes = Wishes(lowest, highest, radius, lambda_km4 * 1e12)
+    link, wishes = _link(given), _wishes(flying, method)
     place = take.read_place(site)
     runway = None if place is None else place.site.runway
     try:
-        case = _case(file, seed, start, goal)
+        case = _case(asked)
         if runway is not None and not case.is_placed:
             case = case.moved_to(runway)
-        flight = plan_flight(case, wishes, _planner(method, objective, seed or 0), runway)
+        flight = plan_flight(case, wishes, _planner(method, asked.seed or 0), runway)
     except SiteError as error:
         raise UsageError(str(error)) from error
     except PlanError as error:
         raise RunError(str(error)) from error
-    summary = _summary(flight, wishes, speed)
-    items, home = mission(flight, speed)
-    written = _write(flight, items, home, wishes, speed, out)
-    if json:
+    summary = _summary(flight, wishes, flying.speed)
+    items, home = mission(flight, flying.speed)
+    written = _write(flight, items, home, wishes, flying.speed, given.out)
+    if telling.json:
         print(text.dumps({**summary, "written": [str(path) for path in written]}))
-    elif not quiet:
+    elif not telling.quiet:
         _show(summary, written)
     if link is not None:
-        _upload(items, home, link, vehicle, quiet=quiet or json)
+        _upload(items, home, link, given.vehicle, quiet=telling.quiet or telling.json)
 
 
-def _link(upload: str | None, vehicle: int | None) -> Url | None:
+def _wishes(flying: Flying, method: Method) -> Wishes:
+    """What the route has to be like. Raises UsageError."""
+    from gateway.geodesy import STANDARD_GRAVITY_MPS2
+    from sim.planning.flight import Wishes
+
+    banked_m = flying.speed**2 / (STANDARD_GRAVITY_MPS2 * math.tan(_BANK_RAD))
+    radius_m = banked_m if flying.turn_radius is None else flying.turn_radius
+    return Wishes(*_read_height(flying.height), radius_m, method.lambda_km4 * 1e12)
+
+
+def _link(given: Given) -> Url | None:
     """Where the mission is given to; None: nowhere. Raises UsageError."""
     from gateway.runtime.urls import MAVLINK_PORT
 
-    if upload is not None:
-        (link,) = take.read_urls([upload], MAVLINK_PORT)
+    if given.upload is not None:
+        (link,) = take.read_urls([given.upload], MAVLINK_PORT)
         return link
-    if vehicle is not None:
+    if given.vehicle is not None:
         raise UsageError("--vehicle says whom --upload gives the mission to; add --upload URL.")
     return None
 
 
-def _case(file: Path | None, seed: int | None, start: str | None, goal: str | None) -> Case:
+def _case(asked: Asked) -> Case:
     from sim.planning.case import drawn_case
     from sim.planning.files import read_case
 
-    if file is None and seed is None:
+    if asked.file is None and asked.seed is None:
         raise UsageError("Say what to plan: a file with threats and areas, or --seed N for the paper's case.")
-    case = drawn_case(seed or 0) if file is None else read_case(file)
-    for end, written in (("start", start), ("goal", goal)):
+    case = drawn_case(asked.seed or 0) if asked.file is None else read_case(asked.file)
+    for end, written in (("start", asked.start), ("goal", asked.goal)):
         if written == "runway":
             case = case.with_end(end, None)
         elif written is not None:
@@ -176,26 +120,26 @@ def _case(file: Path | None, seed: int | None, start: str | None, goal: str | No
     return case
 
 
-def _planner(method: str, objective: str, seed: int) -> Any:
+def _planner(wanted: Method, seed: int) -> Any:
     from functools import partial
 
     from sim.planning import modern
     from sim.planning import seed as paper
     from sim.planning.triples import OBJECTIVES
 
-    chosen = next((one for one in OBJECTIVES if one == objective), None)
+    chosen = next((one for one in OBJECTIVES if one == wanted.objective), None)
     if chosen is None:
-        raise UsageError(f"--objective {objective!r} is none of {', '.join(OBJECTIVES)}.")
+        raise UsageError(f"--objective {wanted.objective!r} is none of {', '.join(OBJECTIVES)}.")
     planners = {
         "modern": modern.plan,
         "seed": partial(paper.plan, seed=seed, how=paper.Seed(chosen)),
         "literal": partial(paper.plan, seed=seed, how=paper.LITERAL),
     }
-    if method not in planners:
-        raise UsageError(f"--method {method!r} is none of {', '.join(planners)}.")
-    if method != "seed" and chosen != OBJECTIVES[0]:
-        raise UsageError(f"--objective {objective} is for --method seed; {method} does not heed it.")
-    return planners[method]
+    if wanted.method not in planners:
+        raise UsageError(f"--method {wanted.method!r} is none of {', '.join(planners)}.")
+    if wanted.method != "seed" and chosen != OBJECTIVES[0]:
+        raise UsageError(f"--objective {wanted.objective} is for --method seed; {wanted.method} does not heed it.")
+    return planners[wanted.method]
 
 
 def _read_height(written: str) -> tuple[float, float]:

@@ -6,6 +6,7 @@ import contextlib
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -59,6 +60,58 @@ def register(app: typer.Typer) -> None:
     app.command("simulate", help=_HELP)(spread(simulate))
 
 
+@dataclass(frozen=True, slots=True)
+class Asking:
+    """What is asked about scenes, in place of playing one."""
+
+    listed: Annotated[bool, typer.Option("--list", help="List the scenes that there are, or those in a folder.")] = (
+        False
+    )
+    shown: Annotated[bool, typer.Option("--show", help="Print the scene's file, to be copied and changed.")] = False
+
+
+@dataclass(frozen=True, slots=True)
+class Playing:
+    """Where a world is played to, and how fast."""
+
+    mavlink: Annotated[str, typer.Option("--mavlink", metavar="URL", help="Where aircraft send.")] = (
+        "udpout:127.0.0.1:14550"
+    )
+    radar: Annotated[str, typer.Option("--radar", metavar="URL", help="Where radars send.")] = "udpout:127.0.0.1:30070"
+    speed: Annotated[str, typer.Option("--speed", metavar="max|N", help="N times real time.")] = "1"
+    archive: Annotated[
+        Path | None,
+        typer.Option(
+            "--archive", metavar="DIR", help="Write a session into DIR instead of sending.", show_default=False
+        ),
+    ] = None
+
+
+@dataclass(frozen=True, slots=True)
+class Changes:
+    """What is otherwise than the scene has it."""
+
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            "--seed", metavar="N", help="Of the random numbers. (default: the scene's, 0)", show_default=False
+        ),
+    ] = None
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="A sensor's parameter, such as gps.period_s=1; repeatable.",
+            show_default=False,
+        ),
+    ] = None
+    watch: Annotated[
+        str | None,
+        typer.Option("--watch", metavar="FILE|URL", help="For the scene radar: what it looks at.", show_default=False),
+    ] = None
+
+
 def simulate(
     scene: Annotated[
         str | None,
@@ -69,78 +122,57 @@ def simulate(
         ),
     ] = None,
     site: take.SiteOption = None,
-    mavlink: Annotated[
-        str, typer.Option("--mavlink", metavar="URL", help="Where aircraft send.")
-    ] = "udpout:127.0.0.1:14550",
-    radar: Annotated[str, typer.Option("--radar", metavar="URL", help="Where radars send.")] = "udpout:127.0.0.1:30070",
-    seed: Annotated[
-        int | None,
-        typer.Option(
-            "--seed", metavar="N", help="Of the random numbers. (default: the scene's, 0)", show_default=False
-        ),
-    ] = None,
-    speed: Annotated[str, typer.Option("--speed", metavar="max|N", help="N times real time.")] = "1",
-    archive: Annotated[
-        Path | None,
-        typer.Option(
-            "--archive", metavar="DIR", help="Write a session into DIR instead of sending.", show_default=False
-        ),
-    ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="A sensor's parameter, such as gps.period_s=1; repeatable.",
-            show_default=False,
-        ),
-    ] = None,
-    watch: Annotated[
-        str | None,
-        typer.Option("--watch", metavar="FILE|URL", help="For the scene radar: what it looks at.", show_default=False),
-    ] = None,
-    listed: Annotated[
-        bool, typer.Option("--list", help="List the scenes that there are, or those in a folder.")
-    ] = False,
-    shown: Annotated[bool, typer.Option("--show", help="Print the scene's file, to be copied and changed.")] = False,
+    playing: Playing = Playing(),
+    changes: Changes = Changes(),
+    asking: Asking = Asking(),
     wanted: Wanted = Wanted(),
     quiet: take.QuietOption = False,
 ) -> None:
     """Play a simulated world."""
     from gateway.cli.scenes import list_scenes, show_scene
 
-    if listed:
+    if asking.listed:
         list_scenes(scene)
         return
     if scene is None:
         raise UsageError("Which scene? talkdown simulate --list names them; or give a scene file of your own.")
-    if shown:
+    if asking.shown:
         if scene in _NO_FILES:
             raise UsageError(f"The scene {scene} has no file to show; talkdown simulate --help says what it takes.")
         show_scene(scene)
         return
-    pace = read_speed(speed, 1.0)
-    _check_belonging(scene, wanted, watch, settings or [], archive)
+    pace, settings, seed, archive = (
+        read_speed(playing.speed, 1.0),
+        changes.settings or [],
+        changes.seed,
+        playing.archive,
+    )
+    _check_belonging(scene, wanted, changes.watch, settings, archive)
     if scene == "helmsman":
         from gateway.cli.helmsman import steer_a_ship
 
-        steer_a_ship(mavlink, settings or [], quiet)
-        return
-    if scene == "vehicle":
-        simulate_vehicles(wanted, site, mavlink, seed=seed or 0, speed=pace, archive=archive, quiet=quiet)
-        return
-    if watch is not None:
+        steer_a_ship(playing.mavlink, settings, quiet)
+    elif scene == "vehicle":
+        simulate_vehicles(wanted, site, playing.mavlink, seed=seed or 0, speed=pace, archive=archive, quiet=quiet)
+    elif changes.watch is not None:
         from gateway.cli.watching import watch_and_send
 
         watch_and_send(
-            watch, site, radar, seed=seed or 0, settings=settings or [], speed=pace, archive=archive, quiet=quiet
+            changes.watch,
+            site,
+            playing.radar,
+            seed=seed or 0,
+            settings=settings,
+            speed=pace,
+            archive=archive,
+            quiet=quiet,
         )
-        return
-    built = _build(scene, site, seed, settings or [])
-    if archive is not None:
-        _write(built, archive, quiet)
     else:
-        _send(built, mavlink, radar, pace, quiet)
+        built = _build(scene, site, seed, settings)
+        if archive is not None:
+            _write(built, archive, quiet)
+        else:
+            _send(built, playing.mavlink, playing.radar, pace, quiet)
 
 
 def _check_belonging(scene: str, wanted: Wanted, watch: str | None, settings: list[str], archive: Path | None) -> None:
