@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
+STANDARD_GRAVITY_MPS2 = 9.80665
 SEMI_MAJOR_M = 6378137.0
 FLATTENING = 1.0 / 298.257223563
 SEMI_MINOR_M = SEMI_MAJOR_M * (1.0 - FLATTENING)

@@ -144,6 +144,9 @@ class AirData:
     wind_up_mps: float | None = None
 
 
+AEROPLANES = frozenset((1, *range(19, 26)))  # MAV_TYPE: fixed wing, and those that take off upright
+
+
 @made_swiftly
 @dataclass(frozen=True, slots=True)
 class VehicleStatus:

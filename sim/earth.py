@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pyproj import Geod
 
-from gateway.geodesy import meridian_radius_m, prime_vertical_radius_m, wrap_rad
+from gateway.geodesy import STANDARD_GRAVITY_MPS2, meridian_radius_m, prime_vertical_radius_m, wrap_rad
 from gateway.settings import Runway
 from sim.paths import Path
 
 Floats = NDArray[np.float64]
 
-GRAVITY_MPS2 = 9.80665
 TURNING_RADPS = math.radians(0.25)  # slower than this is called straight
 _WGS84 = Geod(ellps="WGS84")
 
@@ -78,7 +77,7 @@ def fly(path: Path, runway: Runway, time_s: ArrayLike) -> Flown:
         longitude_rad=longitude,
         height_m=height,
         velocity_mps=velocity,
-        roll_rad=np.arctan(speed * turn / GRAVITY_MPS2),
+        roll_rad=np.arctan(speed * turn / STANDARD_GRAVITY_MPS2),
         pitch_rad=np.arctan2(climb, speed),
         yaw_rad=np.where(moves, np.arctan2(east, north), runway.landing_compass_rad) % (2.0 * math.pi),
         turn_radps=turn,

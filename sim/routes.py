@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import uniform_filter1d
 
-from sim.earth import GRAVITY_MPS2
+from gateway.geodesy import STANDARD_GRAVITY_MPS2
 from sim.paths import Motion
 
 Floats = NDArray[np.float64]
@@ -127,7 +127,7 @@ def _turn(angle_rad: float, speed_mps: float) -> tuple[list[float], list[float],
     """A turn (left positive): piece lengths (3,), curvatures (4,), how far before the corner it begins."""
     if abs(angle_rad) < 1e-9:
         return [0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0], 0.0
-    curvature = GRAVITY_MPS2 * math.tan(BANK_RAD) / speed_mps**2
+    curvature = STANDARD_GRAVITY_MPS2 * math.tan(BANK_RAD) / speed_mps**2
     rolling_m = speed_mps * BANK_RAD / ROLL_RATE_RADPS
     if abs(angle_rad) < curvature * rolling_m:  # too short to reach the full bank
         shorter_m = math.sqrt(abs(angle_rad) * rolling_m / curvature)

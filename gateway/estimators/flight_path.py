@@ -14,13 +14,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from gateway.geodesy import STANDARD_GRAVITY_MPS2
+
 Floats = NDArray[np.float64]
 
 EARTH_M = 6_371_000.0
 SEA_LEVEL_PA, SEA_LEVEL_K = 101_325.0, 288.15
 _GAS_J_PER_KG_K = 287.052_87
 _LAPSE_K_PER_M = 0.0065
-_EXPONENT = 9.806_65 / (_GAS_J_PER_KG_K * _LAPSE_K_PER_M)
+_EXPONENT = STANDARD_GRAVITY_MPS2 / (_GAS_J_PER_KG_K * _LAPSE_K_PER_M)
 SMOOTHED_OVER_S, SHORTEST_S = 3.0, 60.0  # of airspeed before it is held against the thresholds; of a sortie
 CLIMB_OVER_S = 10.0  # a barometer's noise is a twentieth of a metre a second in so long
 _MOST_KNOTS = 400  # of the wind: the normal equations are dense

@@ -16,18 +16,18 @@ from numpy.typing import NDArray
 from gateway.estimators.holding import Held
 from gateway.estimators.kalman import Motion
 from gateway.estimators.turning import Shaken
+from gateway.geodesy import STANDARD_GRAVITY_MPS2
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Rule = Literal["imm", "rmimm", "literal"]  # what tells the modes apart, see `modes`
 
-GRAVITY_MPS2 = 9.80665
 LEAST_SPEED_MPS = 5.0  # below it a bank says nothing of the turn rate
 
 
 def level_turn_rate(speed_mps: Floats, bank_rad: float, least_rps: float) -> Floats:
     """Turn rate (n,) in rad/s of level turns at a bank, at level speeds (n,); `least_rps` where this is more."""
-    banked = GRAVITY_MPS2 * math.tan(bank_rad) / np.maximum(speed_mps, LEAST_SPEED_MPS)
+    banked = STANDARD_GRAVITY_MPS2 * math.tan(bank_rad) / np.maximum(speed_mps, LEAST_SPEED_MPS)
     return np.asarray(np.maximum(banked, least_rps))
 
 

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.observation import AirData, Attitude, GpsReport, Observation, VehicleStatus
+from gateway.observation import AEROPLANES, AirData, Attitude, GpsReport, Observation, VehicleStatus
 
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]
 
 NOTHING = math.nan
-_AEROPLANES = frozenset({0, 1, *range(19, 26)})  # MAV_TYPE: generic, fixed wing, the kinds of VTOL
+_GENERIC = 0  # MAV_TYPE
 
 
 @dataclass(slots=True)
@@ -77,7 +77,7 @@ class Parameters:
     @property
     def flies_by_its_nose(self) -> bool:
         """Whether it is an aeroplane, or may be one; others move where their nose does not point."""
-        return self.kind in _AEROPLANES
+        return self.kind in AEROPLANES or self.kind == _GENERIC
 
     def lacks(self) -> str | None:
         """What is missing for a path, in words; None: nothing."""

@@ -17,7 +17,6 @@ from gateway.geodesy import wrap_rad
 from gateway.offline.flows import CORRIDOR_M, Track, distance_to_go
 
 Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 STEP_M = 250.0  # a track is looked at in steps of this length
 PASSED_M = 3704.0  # 2 nautical miles: who turns before a point passes it inside the turn

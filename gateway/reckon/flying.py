@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators.inertial import matrix, product, turned_by
+from gateway.geodesy import STANDARD_GRAVITY_MPS2
 from gateway.reckon.told import AIRSPEED, ATTITUDE, INERTIAL, Series, Told
 
 Floats = NDArray[np.float64]
 
-GRAVITY_MPS2 = 9.806_65
 PAUSE_NS = 2_500_000_000  # between two attitudes: beyond it nobody knows how it turned; and so long an airspeed counts
 PARTS = 6  # of what is between two attitudes: `cells.GAP_NS` lies between two samples at most
 LISTENS_S = 10.0  # before it is said that no unit tells of a vehicle
@@ -56,7 +56,7 @@ def flown(attitudes: Series, airspeeds: Series) -> Series:
     rate = turned / lasts_s[:, None]
     share = np.arange(PARTS + 1) / PARTS
     lies = product(attitude[begin][:, None], turned_by(turned[:, None] * share[:, None]))
-    force = -GRAVITY_MPS2 * matrix(lies)[..., 2, :]
+    force = -STANDARD_GRAVITY_MPS2 * matrix(lies)[..., 2, :]
     force[..., 1] += (rate[:, 2] * speed)[:, None]
     force[..., 2] -= (rate[:, 1] * speed)[:, None]
     samples = np.ones((len(begin), PARTS + 1, 7))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gateway.estimators import dead_reckoning as dr
 from gateway.estimators.dead_reckoning import Reckoning
 from gateway.estimators.inertial import between, displaced
+from gateway.observation import AEROPLANES
 from gateway.reckon.cells import BLOCK, CELL_S, SECOND_CELLS, Block
 from gateway.reckon.judging import FAR
 from gateway.reckon.tip import NOTHING, Tip, with_each
@@ -54,7 +55,7 @@ class Kinds:
 
 _WHEELS = frozenset((10,))  # ground rover
 _HULLS = frozenset((11,))  # surface boat
-WINGS = frozenset((1, 19, 20, 21, 22, 23, 24, 25, 28))  # fixed wing, VTOL, parafoil
+WINGS = AEROPLANES | {28}  # a parafoil flies as they do
 
 
 def tied(state: Reckoning, told: Block, kinds: Kinds, cell: int, settings: DeadReckoning) -> Reckoning:

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND
 from gateway.frames import RunwayFrame
+from gateway.geodesy import STANDARD_GRAVITY_MPS2
 from gateway.observation import AirData, FlightPlan, GpsReport, Intent, PlanPoint
 from gateway.settings import DEMO_SITE
-from sim.earth import GRAVITY_MPS2
 
 Said = FlightPlan | Intent | AirData | GpsReport
 Floats = NDArray[np.float64]
@@ -84,7 +84,7 @@ def _steered(place: Floats, velocity: Floats, begins: Floats, ends: Floats, spee
     way = aim - place
     angle = math.atan2(float(velocity[0] * way[1] - velocity[1] * way[0]), float(velocity @ way))
     rate = 2.0 * ground / max(float(np.hypot(*way)), 1.0) * math.sin(max(min(angle, 1.5), -1.5))
-    most = GRAVITY_MPS2 * math.tan(BANK_RAD) / speed
+    most = STANDARD_GRAVITY_MPS2 * math.tan(BANK_RAD) / speed
     return max(min(rate, most), -most)
 
 

@@ -14,7 +14,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from sim.earth import GRAVITY_MPS2
+from gateway.geodesy import STANDARD_GRAVITY_MPS2
 from sim.vehicles.body import Body, wrapped
 from sim.vehicles.motion import Vector
 
@@ -110,14 +110,14 @@ class Aeroplane:
         self._roll_radps += (wanted - self._roll_radps) * step_s / _ROLL_RATE_S
         roll += self._roll_radps * step_s
         speed = max(self.airspeed_mps, _SLOWEST_MPS)
-        pull = (controls.climb_rad - self.climb_rad) / _PATH_S * speed / GRAVITY_MPS2
+        pull = (controls.climb_rad - self.climb_rad) / _PATH_S * speed / STANDARD_GRAVITY_MPS2
         stalls_at = (speed / p.slowest_mps) ** 2 * _LIFT * math.cos(roll) - math.cos(self.climb_rad)
         pull = max(min(pull, _PULL, stalls_at), -_PUSH)
-        self.climb_rad += pull * GRAVITY_MPS2 / speed * step_s
+        self.climb_rad += pull * STANDARD_GRAVITY_MPS2 / speed * step_s
         load = (math.cos(self.climb_rad) + pull) / math.cos(roll)
         excess = p.thrust * self.throttle - self.drag(speed, load) - math.sin(self.climb_rad)
-        self.airspeed_mps = max(self.airspeed_mps + GRAVITY_MPS2 * excess * step_s, _SLOWEST_MPS)
-        self._way_rad = wrapped(self._way_rad + GRAVITY_MPS2 * math.tan(roll) / speed * step_s)
+        self.airspeed_mps = max(self.airspeed_mps + STANDARD_GRAVITY_MPS2 * excess * step_s, _SLOWEST_MPS)
+        self._way_rad = wrapped(self._way_rad + STANDARD_GRAVITY_MPS2 * math.tan(roll) / speed * step_s)
         attack = _ATTACK_RAD * load * (p.cruise_mps / speed) ** 2
         pitch += (self.climb_rad + attack * math.cos(roll) - pitch) * step_s / _PITCH_S
         level = self.airspeed_mps * math.cos(self.climb_rad)
@@ -143,7 +143,9 @@ class Aeroplane:
         self.airspeed_mps = self._on_wheels(wind_mps)
         held = _ROLLING + (_BRAKING if controls.is_braking else 0.0)
         drag = 0.5 * self.parameters.drag * (self.airspeed_mps / self.parameters.cruise_mps) ** 2
-        speed = max(speed + GRAVITY_MPS2 * (self.parameters.thrust * self.throttle - held - drag) * step_s, 0.0)
+        speed = max(
+            speed + STANDARD_GRAVITY_MPS2 * (self.parameters.thrust * self.throttle - held - drag) * step_s, 0.0
+        )
         if speed > 0.0:
             self._way_rad = wrapped(self._way_rad + controls.turn_radps * step_s)
         roll, pitch, _ = self.body.attitude_rad

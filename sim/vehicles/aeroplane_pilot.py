@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from adapters.mission_writing import LAND, LOITER_TO_ALTITUDE, TAKE_OFF, MissionItem
-from sim.earth import GRAVITY_MPS2
+from gateway.geodesy import STANDARD_GRAVITY_MPS2
 from sim.vehicles.aeroplane import Aeroplane, Controls
 from sim.vehicles.energy import hold_energy
 from sim.vehicles.missions import DELAY, LOITER_TIME, LOITER_TURNS, LOITER_UNLIMITED, RETURN_HOME
@@ -252,7 +252,7 @@ class AeroplanePilot(Pilot[Controls]):
 
     def _bank(self, pull_mps2: float) -> float:
         limit = math.radians(self.settings["ROLL_LIMIT_DEG"])
-        return min(max(math.atan(pull_mps2 / GRAVITY_MPS2), -limit), limit)
+        return min(max(math.atan(pull_mps2 / STANDARD_GRAVITY_MPS2), -limit), limit)
 
     def _steer(self, pull_mps2: float) -> float:
         speed = max(self._ground_speed(), 1.0)

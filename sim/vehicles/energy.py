@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from sim.earth import GRAVITY_MPS2
+from gateway.geodesy import STANDARD_GRAVITY_MPS2
 from sim.vehicles.aeroplane import Aeroplane, Controls
 
 _CLIMB_PER_M, _SPEED_PER_S, _SPEEDING_UP = 0.3, 0.4, 0.15  # 1/s, 1/s, g
@@ -20,7 +20,7 @@ def hold_energy(aeroplane: Aeroplane, height_m: float, climb_mps: float, speed_m
     speed = max(has_mps, p.slowest_mps)
     climb = climb_mps + _CLIMB_PER_M * (height_m - aeroplane.body.height_m)
     sine = min(max(climb, -p.sink_mps), p.climb_mps) / speed
-    faster = min(max(_SPEED_PER_S * (speed_mps - has_mps) / GRAVITY_MPS2, -_SPEEDING_UP), _SPEEDING_UP)
+    faster = min(max(_SPEED_PER_S * (speed_mps - has_mps) / STANDARD_GRAVITY_MPS2, -_SPEEDING_UP), _SPEEDING_UP)
     needs = aeroplane.drag(speed, 1.0 / math.cos(bank_rad))
     throttle = (needs + sine + faster) / p.thrust
     if throttle > 1.0:

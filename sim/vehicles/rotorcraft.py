@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from sim.earth import GRAVITY_MPS2
+from gateway.geodesy import STANDARD_GRAVITY_MPS2
 from sim.vehicles.body import Body, wrapped
 from sim.vehicles.motion import Vector
 
@@ -85,7 +85,7 @@ class Rotorcraft:
             north = east = self._climbing = 0.0
             self.is_on_ground = True
         self.body.move((north, east, down), self._stance(controls, rising, step_s), step_s)
-        lift = math.hypot(c, d, GRAVITY_MPS2 + rising) / GRAVITY_MPS2
+        lift = math.hypot(c, d, STANDARD_GRAVITY_MPS2 + rising) / STANDARD_GRAVITY_MPS2
         self.throttle = min(0.4 * lift, 1.0)
 
     def _stance(self, controls: Thrust, rising_mps2: float, step_s: float) -> Vector:
@@ -98,7 +98,7 @@ class Rotorcraft:
         yaw = wrapped(yaw + self._yaw_radps * step_s)
         north, east = self._tilt
         forward, right = north * math.cos(yaw) + east * math.sin(yaw), east * math.cos(yaw) - north * math.sin(yaw)
-        up = GRAVITY_MPS2 + rising_mps2
+        up = STANDARD_GRAVITY_MPS2 + rising_mps2
         pitch = -math.atan2(forward, up)
         return math.atan2(right, math.hypot(forward, up)), pitch, yaw
 

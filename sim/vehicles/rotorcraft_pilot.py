@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from adapters.mission_writing import LAND, LOITER_TO_ALTITUDE, TAKE_OFF, WAYPOINT, MissionItem
-from sim.earth import GRAVITY_MPS2
+from gateway.geodesy import STANDARD_GRAVITY_MPS2
 from sim.vehicles.body import wrapped
 from sim.vehicles.missions import DELAY, LOITER_TIME, LOITER_TURNS, LOITER_UNLIMITED, RETURN_HOME, SPLINE
 from sim.vehicles.motion import Answer, GoAround, GoTo, TakeOff
@@ -258,7 +258,7 @@ class RotorcraftPilot(Pilot[Thrust]):
             _SPEED_PER_S * lack + learnt + p.drag_per_s * has + foreseen
             for lack, learnt, has, foreseen in zip(lacking, self._learnt, (north, east), ahead, strict=True)
         ]
-        size, most = math.hypot(*wanted), GRAVITY_MPS2 * math.tan(p.tilt_rad)
+        size, most = math.hypot(*wanted), STANDARD_GRAVITY_MPS2 * math.tan(p.tilt_rad)
         share = min(most / size, 1.0) if size > 0.0 else 1.0
         return Thrust(wanted[0] * share, wanted[1] * share, climb_mps, self._heading_rad, is_flying=True)
 

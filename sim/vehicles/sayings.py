@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gateway.estimators.inertial import from_angles
-from sim.earth import GRAVITY_MPS2
+from gateway.geodesy import STANDARD_GRAVITY_MPS2
 from sim.vehicles.motion import Moment, Vehicle
 from sim.vehicles.sensing import Sensors, dynamic_pressure_hpa
 from sim.vehicles.steering import Plane
@@ -164,7 +164,9 @@ class Sayings:
     def _raw(self, moment: Moment) -> Values:
         rate, force = self.sensors.inertial(moment, self.vehicle.step_s)
         whole = {f"{axis}gyro": round(value * 1e3) for axis, value in zip("xyz", rate, strict=True)}
-        whole |= {f"{axis}acc": round(value * 1e3 / GRAVITY_MPS2) for axis, value in zip("xyz", force, strict=True)}
+        whole |= {
+            f"{axis}acc": round(value * 1e3 / STANDARD_GRAVITY_MPS2) for axis, value in zip("xyz", force, strict=True)
+        }
         return {"time_usec": round(moment.time_s * 1e6), **whole, "xmag": 0, "ymag": 0, "zmag": 0, "id": 1}
 
     def _pressure(self, moment: Moment) -> Values:
