@@ -16,39 +16,53 @@ Floats = NDArray[np.float64]
 FULL_TURN = 2.0 * math.pi
 
 
+@dataclass(frozen=True, slots=True)
+class OnPath:
+    """Where n paths are at h horizons: all (n, h), courses not wrapped."""
+
+    east: Floats
+    north: Floats
+    course: Floats
+    turned: Floats  # radians until then, whichever way
+    passed: Floats  # how many points of the route
+
+    @classmethod
+    def nowhere(cls, horizons: Floats) -> OnPath:
+        """Of paths that nobody looks at."""
+        nothing = np.zeros(horizons.shape)
+        return cls(nothing, nothing, nothing, nothing, nothing)
+
+
 @dataclass(slots=True)
 class Path:
-    """The end of n paths so far, (n,) or (n, 2), and what is known of the horizons (n, h); it grows leg by leg."""
+    """The end of n paths so far, (n,) or (n, 2), and the legs that lead there; it grows leg by leg.
+
+    What is asked for are horizons (n, h): each is on one leg only, so all legs are looked at together when the path is made.
+    """
 
     position: Floats
     course: Floats
     time_s: Floats
     turned: Floats
     horizons: Floats
-    east_at: Floats
-    north_at: Floats
-    course_at: Floats
-    turned_at: Floats
-    passed_at: Floats
+    legs: list[tuple[Floats, ...]]  # as `_leg` has them
+    braking: Floats | None = None  # (n,) m/s2 on the last leg
 
     @classmethod
     def at_start(cls, position: Floats, course: Floats, horizons: Floats) -> Path:
         """A path of no length."""
         nothing = np.zeros(len(course))
-        return cls(position, course, nothing, nothing, horizons, *np.zeros((5, *horizons.shape)))
+        return cls(position, course, nothing, nothing, horizons, [])
+
+    def _leg(self, speed: Floats, rate: Floats, passed: int) -> None:
+        """From here on so fast, in such a turn: begun then and there, on this course, so far turned, so many points passed."""
+        east, north = self.position[:, 0], self.position[:, 1]
+        points = np.full(len(speed), float(passed))
+        self.legs.append((self.time_s, east, north, self.course, self.turned, points, speed, rate))
 
     def extend(self, speed: Floats, rate: Floats, duration_s: Floats, passed: int) -> None:
         """Fly on with these ground speeds and turn rates (n,) for so long (n,); all later horizons are on it so far."""
-        since = self.horizons - self.time_s[:, None]
-        on = since >= 0.0
-        chord, bend = _arc(rate[:, None] * since)
-        middle, turn = self.course[:, None] + bend, 2.0 * bend
-        length = speed[:, None] * since * chord
-        np.copyto(self.east_at, self.position[:, 0, None] + length * np.cos(middle), where=on)
-        np.copyto(self.north_at, self.position[:, 1, None] + length * np.sin(middle), where=on)
-        np.copyto(self.course_at, self.course[:, None] + turn, where=on)
-        np.copyto(self.turned_at, self.turned[:, None] + np.abs(turn), where=on)
-        np.copyto(self.passed_at, float(passed), where=on)
+        self._leg(speed, rate, passed)
         chord, bend = _arc(rate * duration_s)
         length = speed * duration_s * chord
         middle = self.course + bend
@@ -59,28 +73,36 @@ class Path:
 
     def straight(self, speed: Floats, duration_s: Floats, passed: int) -> None:
         """Fly straight on with these ground speeds (n,) for so long (n,): the bits of `extend` with no turn, in less time."""
-        since = self.horizons - self.time_s[:, None]
-        on, length = since >= 0.0, speed[:, None] * since
+        self._leg(speed, np.zeros(len(speed)), passed)
         cosine, sine = np.cos(self.course), np.sin(self.course)
-        np.copyto(self.east_at, self.position[:, 0, None] + length * cosine[:, None], where=on)
-        np.copyto(self.north_at, self.position[:, 1, None] + length * sine[:, None], where=on)
-        np.copyto(self.course_at, self.course[:, None], where=on)
-        np.copyto(self.turned_at, self.turned[:, None], where=on)
-        np.copyto(self.passed_at, float(passed), where=on)
         self.position = self.position + (speed * duration_s)[:, None] * np.stack([cosine, sine], axis=-1)
         self.time_s = self.time_s + duration_s
 
     def stop(self, speed: Floats, braking: Floats, passed: int) -> None:
         """Straight on for good, brought to rest where `braking` (n,) m/s2 is not 0."""
-        since = np.maximum(self.horizons - self.time_s[:, None], 0.0)
-        on = self.horizons >= self.time_s[:, None]
-        moving = np.minimum(since, (speed / np.maximum(braking, 1e-9))[:, None])
-        length = speed[:, None] * moving - 0.5 * braking[:, None] * moving * moving
-        np.copyto(self.east_at, self.position[:, 0, None] + length * np.cos(self.course)[:, None], where=on)
-        np.copyto(self.north_at, self.position[:, 1, None] + length * np.sin(self.course)[:, None], where=on)
-        np.copyto(self.course_at, self.course[:, None], where=on)
-        np.copyto(self.turned_at, self.turned[:, None], where=on)
-        np.copyto(self.passed_at, float(passed), where=on)
+        self._leg(speed, np.zeros(len(speed)), passed)
+        self.braking = braking if braking.any() else None
+
+    def at_horizons(self) -> OnPath:
+        """Where the paths, of one leg at least, are at their horizons: each on the last leg that has begun by then."""
+        legs = np.array(self.legs)
+        begins = legs[:, 0]
+        last = (begins[:, :, None] <= self.horizons).sum(axis=0) - 1
+        n = len(self.course)
+        place = last * (legs.shape[1] * n) + np.arange(n)[:, None]
+        since, east, north, course, turned, passed, speed, rate = (
+            legs.take(place + column * n) for column in range(legs.shape[1])
+        )
+        since = self.horizons - since
+        length = speed * since
+        if self.braking is not None:
+            braking = np.where(last == len(legs) - 1, self.braking[:, None], 0.0)
+            moving = np.minimum(since, speed / np.maximum(braking, 1e-9))
+            length = speed * moving - 0.5 * braking * moving * moving
+        chord, bend = _arc(rate * since)
+        length, middle, turn = length * chord, course + bend, 2.0 * bend
+        east, north = east + length * np.cos(middle), north + length * np.sin(middle)
+        return OnPath(east, north, course + turn, turned + np.abs(turn), passed)
 
 
 def or_zero(values: Floats) -> Floats:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from gateway.estimators import intent
 from gateway.estimators.circling import Circles, entered, go_round
-from gateway.estimators.turns_and_straights import Path, angle_to_go, or_zero
+from gateway.estimators.turns_and_straights import OnPath, Path, angle_to_go, or_zero
 from gateway.geodesy import wrap_rad
 
 Floats = NDArray[np.float64]
@@ -151,22 +151,23 @@ def _as_now(now: Moving, wind: Floats, air_speed: Floats | None) -> tuple[Floats
     return course, speed, np.sqrt(((now.velocity - wind) ** 2).sum(axis=1))
 
 
-def _carried_on(now: Moving, course: Floats, speed: Floats, horizons_s: Floats, follows: Bools) -> Path:
+def _carried_on(now: Moving, course: Floats, speed: Floats, horizons_s: Floats, follows: Bools) -> OnPath:
     """The paths of n aircraft on in their present turns; of those that follow none is looked at."""
+    if follows.all():
+        return OnPath.nowhere(horizons_s)
     on = Path.at_start(now.position, course, horizons_s)
-    if not follows.all():
-        on.extend(speed, now.turn_rate, np.zeros(len(speed)), 0)
-    return on
+    on.extend(speed, now.turn_rate, np.zeros(len(speed)), 0)
+    return on.at_horizons()
 
 
-def _either(path: Path, on: Path, slower_from: Floats, follows: Bools) -> Ahead:
+def _either(path: Path, on: OnPath, slower_from: Floats, follows: Bools) -> Ahead:
     """Along the route of who follows it, on in the present turn of others."""
-    chosen = follows[:, None]
+    chosen, there = follows[:, None], path.at_horizons()
     return Ahead(
-        np.stack([np.where(chosen, path.east_at, on.east_at), np.where(chosen, path.north_at, on.north_at)], axis=-1),
-        np.where(chosen, path.course_at, on.course_at),
-        np.where(chosen, path.turned_at, on.turned_at),
-        np.where(chosen, path.passed_at, 0.0),
+        np.stack([np.where(chosen, there.east, on.east), np.where(chosen, there.north, on.north)], axis=-1),
+        np.where(chosen, there.course, on.course),
+        np.where(chosen, there.turned, on.turned),
+        np.where(chosen, there.passed, 0.0),
         np.where(chosen, np.maximum(path.horizons - path.time_s[:, None], 0.0), 0.0),
         np.where(chosen, np.maximum(path.horizons - slower_from[:, None], 0.0), 0.0),
         follows,
