@@ -17,7 +17,8 @@ from gateway.cli.failures import RunError, UsageError, writing
 from gateway.cli.replay_options import FilesArgument, MuteOption
 
 if TYPE_CHECKING:
-    from gateway.offline.reconstruction import How, Place, Sortie
+    from gateway.offline.carrying import Place
+    from gateway.offline.reconstruction import How, Sortie
     from gateway.runtime.playback import Playback
     from gateway.runtime.setup import Place as SitePlace
 

@@ -8,11 +8,9 @@ how it changed. All paths here are level: east and north in metres from the lift
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from gateway.geodesy import STANDARD_GRAVITY_MPS2
 
@@ -25,7 +23,6 @@ _LAPSE_K_PER_M = 0.0065
 _EXPONENT = STANDARD_GRAVITY_MPS2 / (_GAS_J_PER_KG_K * _LAPSE_K_PER_M)
 SMOOTHED_OVER_S, SHORTEST_S = 3.0, 60.0  # of airspeed before it is held against the thresholds; of a sortie
 CLIMB_OVER_S = 10.0  # a barometer's noise is a twentieth of a metre a second in so long
-_MOST_KNOTS = 400  # of the wind: the normal equations are dense
 
 
 def air_velocity(
@@ -108,68 +105,6 @@ def closed(time_s: Floats, path_m: Floats, end_m: ArrayLike) -> tuple[Floats, Fl
     """
     wind = (np.asarray(end_m, dtype=np.float64) - path_m[-1]) / (time_s[-1] - time_s[0])
     return path_m + (time_s - time_s[0])[:, None] * wind, wind
-
-
-@dataclass(frozen=True, slots=True)
-class Fixes:
-    """Places that are known: when, s; where (m, 2), metres east and north of lift-off; how well (m,), 1 sigma an axis, m."""
-
-    time_s: Floats
-    place_m: Floats
-    sigma_m: Floats
-
-
-@dataclass(frozen=True, slots=True)
-class Tied:
-    """A path that passes known places: (n, 2) m, 1 sigma an axis (n,) m, and the wind that carried it (n, 2) m/s."""
-
-    path_m: Floats
-    sigma_m: Floats
-    wind_mps: Floats
-
-
-def tied(
-    time_s: Floats,
-    path_m: Floats,
-    fixes: Fixes,
-    *,
-    knots_s: float = 30.0,
-    wind_sigma_mps: float = 15.0,
-    wanders_mps_per_sqrt_s: float = 0.2,
-) -> Tied:
-    """The path (n, 2) through the air, carried by the wind that takes it closest to the fixes: least squares over all of it.
-
-    The first sample stays where it is. The wind is linear between knots, and wanders from one to the next as a random walk.
-    With a single exact fix at the end and a wind that does not wander this is `closed`. Source: 002-2, known fixes.
-    """
-    first, length = time_s[0], time_s[-1] - time_s[0]
-    count = min(max(math.ceil(length / knots_s), 1), _MOST_KNOTS)
-    step = length / count
-    weights = _carried((time_s - first) / step, count) * step  # of each knot's wind in the way it has carried, s
-    at_fixes = _carried((fixes.time_s - first) / step, count) * step
-    information = np.zeros((count + 1, count + 1))
-    wanders = np.diff(np.eye(count + 1), axis=0)
-    information += wanders.T @ wanders / (wanders_mps_per_sqrt_s**2 * step)
-    information[0, 0] += 1.0 / wind_sigma_mps**2
-    through_air = np.stack([np.interp(fixes.time_s, time_s, path_m[:, axis]) for axis in (0, 1)], axis=-1)
-    scaled = at_fixes / fixes.sigma_m[:, None]
-    information += scaled.T @ scaled
-    factor = cho_factor(information)
-    found = cho_solve(factor, scaled.T @ ((fixes.place_m - through_air) / fixes.sigma_m[:, None]))
-    covariance = cho_solve(factor, np.eye(count + 1))
-    sigma = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", weights, covariance, weights, optimize=True), 0.0))
-    wind = np.stack(
-        [np.interp((time_s - first) / step, np.arange(count + 1), found[:, axis]) for axis in (0, 1)], axis=-1
-    )
-    return Tied(path_m + weights @ found, sigma, wind)
-
-
-def _carried(knots: Floats, count: int) -> Floats:
-    """(n, count + 1): the integral from 0 to each of `knots` of each hat function on 0, 1, ... count."""
-    since = np.clip(knots[:, None] - np.arange(count + 1), -1.0, 1.0)
-    hats = np.where(since < 0.0, 0.5 * (1.0 + since) ** 2, 0.5 + since - 0.5 * since**2)
-    hats[:, 0] -= 0.5  # the half of the first that lies before 0
-    return hats
 
 
 def true_airspeed(calibrated_mps: ArrayLike, pressure_pa: ArrayLike, temperature_k: ArrayLike = math.nan) -> Floats:

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.observation import AEROPLANES, AirData, Attitude, GpsReport, Observation, VehicleStatus
+from gateway.estimators.inertial_wind import Felt
+from gateway.observation import AEROPLANES, AirData, Attitude, GpsReport, ImuSample, Observation, VehicleStatus
 
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]
@@ -32,6 +33,11 @@ class Series:
         self._time.append(at)
         self._values.extend(NOTHING if value is None else value for value in values)
 
+    def extend(self, at: Times, values: Floats) -> None:
+        """Rows (n,) and (n, width)."""
+        self._time.frombytes(np.ascontiguousarray(at, dtype=np.int64).tobytes())
+        self._values.frombytes(np.ascontiguousarray(values, dtype=np.float64).tobytes())
+
     def __len__(self) -> int:
         return len(self._time)
 
@@ -51,6 +57,7 @@ class Parameters:
     attitude: Series = field(default_factory=lambda: Series(3))  # roll, pitch, yaw, rad
     pressure: Series = field(default_factory=lambda: Series(2))  # static Pa, temperature K
     places: Series = field(default_factory=lambda: Series(5))  # latitude rad, longitude rad, altitude, height, sigma m
+    forces: dict[int, Series] = field(default_factory=dict)  # by accelerometer: along the body, m/s2
     kind: int = 0  # as MAVLink numbers vehicles
 
     def take(self, observation: Observation) -> None:
@@ -71,8 +78,30 @@ class Parameters:
                 observation.height_m,
                 observation.horizontal_sigma_m,
             )
+        elif isinstance(observation, ImuSample):
+            if observation.acceleration_mps2 is not None:
+                self._force(observation.sensor).add(observation.valid_at, *observation.acceleration_mps2)
         elif isinstance(observation, VehicleStatus):
             self.kind = observation.vehicle_type
+
+    def feel(self, sensor: int, at: Times, force_mps2: Floats) -> None:
+        """Samples (n, 3) of an accelerometer; rows without any are left out."""
+        felt = ~np.isnan(force_mps2).any(axis=1)
+        self._force(sensor).extend(at[felt], force_mps2[felt])
+
+    def _force(self, sensor: int) -> Series:
+        return self.forces.setdefault(sensor, Series(3))
+
+    def felt(self, origin: int) -> Felt | None:
+        """The samples of the accelerometer that told most, with the attitude then, seconds from `origin`; None without any."""
+        most = max(self.forces, key=lambda sensor: (len(self.forces[sensor]), -sensor), default=None)
+        if most is None or len(self.attitude) < 2:
+            return None
+        time, force = self.forces[most].columns()
+        attitude_at, attitude = self.attitude.columns()
+        known = (time >= attitude_at[0]) & (time <= attitude_at[-1])
+        angles = [_at(time[known], attitude_at, np.unwrap(column)) for column in attitude.T]
+        return Felt((time[known] - origin) * 1e-9, force[known], np.stack(angles, axis=-1))
 
     @property
     def flies_by_its_nose(self) -> bool:

@@ -6,28 +6,23 @@ Source: 002-2. Positions are used only for what is asked: where lift-off was, an
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators import flight_path as paths
-from gateway.frames import RunwayFrame
+from gateway.estimators.inertial_wind import Felt
+from gateway.estimators.tied_path import Tied
+from gateway.offline.carrying import GAP_S, SECOND, Muted, Place, carried, evidence_of, fixes_of, frame_at, level_m
 from gateway.offline.parameters import Flown, Parameters, Times
-from gateway.settings import Runway
 
 Floats = NDArray[np.float64]
-Place = tuple[float, float]  # latitude, longitude, rad
 
-SECOND = 1_000_000_000
-END_SIGMA_M = 1.0  # of a place on which a path is closed
-USUAL_SIGMA_M = 3.0  # of a position whose stream does not say
 TAKE_OFF_SHARE, LANDING_SHARE = (
     0.6,
     0.45,
 )  # of the cruising speed: what most fixed-wing aircraft lift off and touch down at
-GAP_S = 10.0  # a longer silence is not integrated over: what comes after it is a piece of its own
-_FIXES_APART_NS = SECOND
 
 
 class Unplaced(ValueError):
@@ -44,7 +39,8 @@ class How:
     close_on: Place | str = "lift-off"  # "lift-off", "nothing", or a place
     runway_compass_rad: float | None = None  # with one the heading's constant error is found on the take-off roll
     fixes: bool = False  # whether positions tie the path
-    muted: tuple[tuple[int, int], ...] = ()  # positions of these times tie nothing
+    inertial: bool = True  # whether accelerations tell how the wind changed, where they are told
+    muted: Muted = ()  # positions of these times tie nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +93,7 @@ class Sortie:
     landed: bool  # it ended below the landing speed, not with the recording
     compared: Compared | None
     fixes: int
+    by_accelerations: bool  # whether they told how the wind changed
 
     @property
     def geodetic_deg(self) -> Floats | None:
@@ -105,7 +102,7 @@ class Sortie:
             return None
         east, north = self.path_m.T
         curved = -(east**2 + north**2) / (2.0 * paths.EARTH_M)  # on the ellipsoid, not on the plane that touches it
-        latitude, longitude, _ = _frame(self.lift_off).geodetic_from_enu(np.stack([east, north, curved], axis=-1))
+        latitude, longitude, _ = frame_at(self.lift_off).geodetic_from_enu(np.stack([east, north, curved], axis=-1))
         return np.degrees(np.stack([latitude, longitude], axis=-1))
 
     @property
@@ -137,15 +134,33 @@ def reconstructed(parameters: Parameters, how: How = How()) -> list[Sortie]:
     if not 0.0 < landing < take_off:
         return []
     places = parameters.places.columns()
+    felt = parameters.felt(int(flown.time[0])) if how.inertial and parameters.flies_by_its_nose else None
     sorties: list[Sortie] = []
     for piece in flown.pieces(GAP_S):
         time_s = (piece.time - piece.time[0]) * 1e-9
         found = paths.sorties(time_s, piece.airspeed_mps, take_off, landing)
-        sorties += [_sortie(piece, first, end, take_off, places, how) for first, end in found]
+        sorties += [
+            _sortie(piece, first, end, take_off, places, _since(felt, flown, piece, first), how) for first, end in found
+        ]
     return sorties
 
 
-def _sortie(flown: Flown, first: int, end: int, take_off_mps: float, places: tuple[Times, Floats], how: How) -> Sortie:
+def _since(felt: Felt | None, flown: Flown, piece: Flown, first: int) -> Felt | None:
+    """What was felt, with seconds from a sortie's first sample."""
+    if felt is None:
+        return None
+    return replace(felt, time_s=felt.time_s - (piece.time[first] - flown.time[0]) * 1e-9)
+
+
+def _sortie(
+    flown: Flown,
+    first: int,
+    end: int,
+    take_off_mps: float,
+    places: tuple[Times, Floats],
+    felt: Felt | None,
+    how: How,
+) -> Sortie:
     part, took_off, landed = slice(first, end + 1), first > 0, end < len(flown.time) - 1
     time, time_s = flown.time[part], (flown.time[part] - flown.time[first]) * 1e-9
     bias = _heading_bias(flown, first, take_off_mps, how.runway_compass_rad)
@@ -165,15 +180,16 @@ def _sortie(flown: Flown, first: int, end: int, take_off_mps: float, places: tup
         height = through_air[:, 2]
     knows_its_end = landed and (took_off or how.close_on != "lift-off")
     target = _target(how.close_on, lift_off) if knows_its_end else None
-    fixes = _fixes(places, time, lift_off, how)
-    carried = _carried(time_s, through_air[:, :2], target, fixes, isinstance(how.close_on, str))
+    fixes = fixes_of(places, time, lift_off, how.muted) if how.fixes and lift_off is not None else None
+    evidence = None if felt is None else evidence_of(felt, time_s, velocity[:, :2], lift_off)
+    found = carried(time_s, through_air[:, :2], target, fixes, evidence, isinstance(how.close_on, str))
     return Sortie(
         time=time,
         open_m=through_air,
-        path_m=carried.path_m,
-        sigma_m=carried.sigma_m,
+        path_m=found.path_m,
+        sigma_m=found.sigma_m,
         height_m=height,
-        wind_mps=carried.wind_mps,
+        wind_mps=found.wind_mps,
         roll_rad=roll,
         pitch_rad=pitch,
         compass_rad=compass,
@@ -185,8 +201,9 @@ def _sortie(flown: Flown, first: int, end: int, take_off_mps: float, places: tup
         height_by=height_by,
         took_off=took_off,
         landed=landed,
-        compared=None if lift_off is None else _compared(places, time, through_air, carried.path_m, height, lift_off),
-        fixes=0 if fixes is None else len(fixes.time_s),
+        compared=None if lift_off is None else _compared(places, time, through_air, found.path_m, height, lift_off),
+        fixes=0 if fixes is None else len(fixes.time_s) // 2,
+        by_accelerations=evidence is not None and isinstance(found, Tied),
     )
 
 
@@ -199,24 +216,6 @@ def _target(close_on: Place | str, lift_off: Place | None) -> Floats | None:
     if lift_off is None:
         raise Unplaced("no position tells where it lifted off, so a path cannot be closed on a place")
     return np.asarray(level_m(np.array([close_on[0]]), np.array([close_on[1]]), lift_off)[0])
-
-
-def _carried(
-    time_s: Floats, path_m: Floats, target_m: Floats | None, fixes: paths.Fixes | None, usual_end: bool
-) -> paths.Tied:
-    """The path through the air, carried by the wind: by fixes, by its end, or, where nothing tells, not at all.
-
-    Where fixes tell, that it came back to where it lifted off is no more than a guess; a place that was given is one of them.
-    """
-    ends = None if target_m is None else paths.Fixes(time_s[-1:], target_m[None], np.array([END_SIGMA_M]))
-    if fixes is not None:
-        if ends is not None and not usual_end:
-            fixes = paths.Fixes(*(np.concatenate(pair) for pair in zip(astuple(fixes), astuple(ends), strict=True)))
-        return paths.tied(time_s, path_m, fixes)
-    if ends is None or target_m is None:
-        return paths.Tied(path_m, np.full(len(time_s), math.nan), np.full(path_m.shape, math.nan))
-    path, wind = paths.closed(time_s, path_m, target_m)
-    return paths.Tied(path, paths.tied(time_s, path_m, ends).sigma_m, np.broadcast_to(wind, path.shape))
 
 
 def _heading_bias(
@@ -240,16 +239,6 @@ def _heights(flown: Flown, part: slice) -> tuple[Floats, Floats | None, str]:
     return np.full(len(altitude), paths.SEA_LEVEL_PA), None, "pitch"
 
 
-def level_m(latitude_rad: Floats, longitude_rad: Floats, lift_off: Place) -> Floats:
-    """East and north (n, 2) of lift-off, m, of places on the ellipsoid."""
-    return _frame(lift_off).enu_from_geodetic(latitude_rad, longitude_rad, np.zeros_like(latitude_rad))[..., :2]
-
-
-def _frame(lift_off: Place) -> RunwayFrame:
-    """East, north and up at a place on the ellipsoid."""
-    return RunwayFrame(Runway(*lift_off, height_m=0.0, landing_compass_rad=0.0))
-
-
 def _nearest_place(places: tuple[Times, Floats], at: int) -> Place | None:
     """The position told nearest to an instant, if within 5 s."""
     time, values = places
@@ -259,22 +248,6 @@ def _nearest_place(places: tuple[Times, Floats], at: int) -> Place | None:
     if abs(int(time[nearest]) - at) > 5 * SECOND:
         return None
     return float(values[nearest, 0]), float(values[nearest, 1])
-
-
-def _fixes(places: tuple[Times, Floats], time: Times, lift_off: Place | None, how: How) -> paths.Fixes | None:
-    """The positions that may tie the path, at most one a second; None where there are none."""
-    told_at, values = places
-    if not how.fixes or lift_off is None:
-        return None
-    good = (told_at >= time[0]) & (told_at <= time[-1])
-    for since, until in how.muted:
-        good &= ~((told_at >= since) & (told_at < until))
-    second = told_at // _FIXES_APART_NS
-    good &= np.concatenate([[True], second[1:] != second[:-1]])
-    if not good.any():
-        return None
-    sigma = np.where(np.isnan(values[good, 4]), USUAL_SIGMA_M, values[good, 4])
-    return paths.Fixes((told_at[good] - time[0]) * 1e-9, level_m(values[good, 0], values[good, 1], lift_off), sigma)
 
 
 def _compared(

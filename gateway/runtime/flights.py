@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from adapters.decode import Decoder
-from gateway.observation import AirData, Attitude, GpsReport, Many, Observation, VehicleStatus
+from gateway.observation import AirData, Attitude, GpsReport, ImuSample, Many, Observation, VehicleStatus
 from gateway.offline.parameters import Parameters
 from gateway.offline.reconstruction import Sortie
 from gateway.runtime.playback import Playback
@@ -38,15 +38,32 @@ def read_parameters(playback: Playback, tell: Callable[[float], None]) -> dict[s
     while some := list(islice(left, _TOGETHER)):
         for _, heard in decoder.hear_many(some)[0]:
             for observation in heard.observations:
-                if isinstance(observation, Many):
-                    several: Iterable[Observation] = observation if observation.kind is AirData else ()
-                else:
-                    several = (observation,)
-                for one in several:
-                    if isinstance(one, AirData | Attitude | GpsReport | VehicleStatus):
-                        found.setdefault(one.aircraft, Parameters()).take(one)
+                _take(observation, found)
         tell(playback.fraction())
     return found
+
+
+def _take(observation: Observation, found: dict[str, Parameters]) -> None:
+    """Keep what paths can be made of with whom it is of."""
+    if isinstance(observation, Many) and observation.kind is ImuSample:
+        _feel(observation, found)
+        return
+    for one in observation if isinstance(observation, Many) else (observation,):
+        if isinstance(one, AirData | Attitude | GpsReport | ImuSample | VehicleStatus):
+            found.setdefault(one.aircraft, Parameters()).take(one)
+
+
+def _feel(samples: Many, found: dict[str, Parameters]) -> None:
+    """Inertial samples in columns: too many to be taken one by one."""
+    columns = samples.columns
+    if "acceleration_mps2" not in columns:
+        return
+    whose = np.array([f"{one} {sensor}" for one, sensor in zip(columns["aircraft"], columns["sensor"], strict=True)])
+    for one in np.unique(whose):
+        rows = np.flatnonzero(whose == one)
+        aircraft, sensor = str(columns["aircraft"][rows[0]]), int(columns["sensor"][rows[0]])
+        taken = found.setdefault(aircraft, Parameters())
+        taken.feel(sensor, columns["valid_at"][rows], columns["acceleration_mps2"][rows])
 
 
 def write_flights(flights: Mapping[str, Sequence[Sortie]], folder: Path) -> tuple[Path, Path]:

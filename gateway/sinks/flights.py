@@ -14,7 +14,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from gateway.offline.reconstruction import Sortie, level_m
+from gateway.offline.carrying import level_m
+from gateway.offline.reconstruction import Sortie
 from gateway.sinks.scene import style
 from gateway.sinks.scene.attitude import quaternion_from_attitude
 from gateway.sinks.scene.entry import entity

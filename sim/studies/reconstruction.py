@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators import flight_path as paths
+from gateway.estimators.tied_path import Known, tied
 from sim.studies import Progress, Study, Table, silent
 
 Floats = NDArray[np.float64]
@@ -229,10 +230,8 @@ def _unseen(runs: int, seed: int, figures: dict[str, float]) -> Table:
         end = windy.place_m[-1, :2]
         left["wind, closed"].append(off_m(windy, paths.closed(windy.time_s, path, end)[0]) * 100.0 / windy.length_m)
         known = np.linspace(0, len(windy.time_s) - 1, 5).astype(int)[1:]
-        fixes = paths.Fixes(windy.time_s[known], windy.place_m[known, :2], np.full(4, 5.0))
-        left["wind, 4 fixes"].append(
-            off_m(windy, paths.tied(windy.time_s, path, fixes).path_m) * 100.0 / windy.length_m
-        )
+        fixes = Known.places(windy.time_s[known], windy.place_m[known, :2], np.full(4, 5.0))
+        left["wind, 4 fixes"].append(off_m(windy, tied(windy.time_s, path, fixes).path_m) * 100.0 / windy.length_m)
     rows = [(name, float(np.median(values)), max(values)) for name, values in left.items()]
     figures |= {name: middle for name, middle, _ in rows}
     title = "002-2: what closing does not see: a heading 2 degrees off, a wind that doubles; % of the length"

@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.estimators.flight_path import (
-    Fixes,
     closed,
     heading_bias,
     integrated,
@@ -19,9 +18,9 @@ from gateway.estimators.flight_path import (
     smoothed,
     sorties,
     standard_pressure,
-    tied,
     true_airspeed,
 )
+from gateway.estimators.tied_path import Known, tied
 from gateway.geodesy import enu_axes, geodetic_to_ecef
 
 
@@ -37,7 +36,7 @@ def _wandering(seed: int, count: int = 900) -> tuple[np.ndarray, np.ndarray, np.
 def test_one_exact_fix_at_the_end_is_closing() -> None:
     """Least squares with a wind that cannot wander spreads the error evenly over time."""
     time, path, true = _wandering(1)
-    fixes = Fixes(time[-1:], true[-1:], np.array([1e-3]))
+    fixes = Known.places(time[-1:], true[-1:], np.array([1e-3]))
     found = tied(time, path, fixes, wind_sigma_mps=1e4, wanders_mps_per_sqrt_s=1e-6)
     expected, wind = closed(time, path, true[-1])
     np.testing.assert_allclose(found.path_m, expected, atol=0.01)
@@ -52,7 +51,7 @@ def test_more_fixes_bring_the_path_closer_and_the_sigma_tells_by_how_much() -> N
         for seed in range(40):
             time, path, true = _wandering(seed)
             at = np.linspace(0, len(time) - 1, known + 1).astype(int)[1:]
-            found = tied(time, path, Fixes(time[at], true[at], np.full(known, 3.0)))
+            found = tied(time, path, Known.places(time[at], true[at], np.full(known, 3.0)))
             some = slice(20, -20, 20)
             error = (found.path_m - true)[some]
             share.append(np.mean(error**2 / found.sigma_m[some, None] ** 2))
@@ -66,7 +65,7 @@ def test_more_fixes_bring_the_path_closer_and_the_sigma_tells_by_how_much() -> N
 def test_the_first_sample_stays() -> None:
     """Whatever the fixes say, the path begins where it began."""
     time, path, true = _wandering(2)
-    found = tied(time, path, Fixes(time[[300, 800]], true[[300, 800]], np.array([3.0, 3.0])))
+    found = tied(time, path, Known.places(time[[300, 800]], true[[300, 800]], np.array([3.0, 3.0])))
     assert (found.path_m[0] == path[0]).all()
     assert found.sigma_m[0] == 0.0
 
