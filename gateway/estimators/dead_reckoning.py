@@ -92,21 +92,24 @@ def carried_through(
     interval_s: ArrayLike,
     unit: Unit = Unit(),
     more: tuple[Floats, Floats] | None = None,
+    gyro: ArrayLike = 1.0,
 ) -> Reckoning:
     """Some equal intervals later, of each one's mean rate and force (..., m, 3): motion by motion, the covariance at once.
 
-    `more`: noises of rate and force (..., 3) in a root Hz, along the body, beyond the unit's.
+    `more`: noises of rate and force (..., 3) in a root Hz, along the body, beyond the unit's. `gyro` (...,): 1 where the
+    rates are a gyro's, 0 where they are another's, which the gyro's bias is not in.
     """
+    biased = np.asarray(gyro, dtype=np.float64)[..., None]
     count = rates_radps.shape[-2]
     step = np.broadcast_to(np.asarray(interval_s, dtype=np.float64), np.shape(state.motion.height_m))
     motion, body, felt = state.motion, np.zeros(()), np.zeros(())
     for place in range(count):
-        rate = rates_radps[..., place, :] - state.rate_bias_radps
+        rate = rates_radps[..., place, :] - biased * state.rate_bias_radps
         force = forces_mps2[..., place, :] - state.force_bias_mps2
         turned = matrix(motion.attitude)
         body, felt = body + turned / count, felt + (turned @ force[..., None])[..., 0] / count
         motion = advanced(motion, rate, force, step)
-    covariance = _covariance_after(state.covariance, body, felt, step * count, unit)
+    covariance = _covariance_after(state.covariance, body, felt, biased, step * count, unit)
     if more is not None:
         for part, noise in ((ATTITUDE, more[0]), (VELOCITY, more[1])):
             whole = body * (noise**2 * (step * count)[..., None])[..., None, :]
@@ -114,7 +117,9 @@ def carried_through(
     return replace(state, motion=motion, covariance=covariance)
 
 
-def _covariance_after(covariance: Floats, body: Floats, felt: Floats, step: Floats, unit: Unit) -> Floats:
+def _covariance_after(
+    covariance: Floats, body: Floats, felt: Floats, biased: Floats, step: Floats, unit: Unit
+) -> Floats:
     """The covariance a while (...,) later, of the mean attitude (..., 3, 3) and the mean force felt (..., 3) in it."""
     across = np.zeros((*step.shape, STATES, STATES))
     across[..., :, :] = _EYE
@@ -123,7 +128,7 @@ def _covariance_after(covariance: Floats, body: Floats, felt: Floats, step: Floa
     across[..., PLACE, VELOCITY] = np.eye(3) * whole
     across[..., PLACE, ATTITUDE], across[..., PLACE, FORCE] = tilt * half, lean * half
     across[..., VELOCITY, ATTITUDE], across[..., VELOCITY, FORCE] = tilt, lean
-    across[..., ATTITUDE, GYRO] = lean
+    across[..., ATTITUDE, GYRO] = biased[..., None] * lean
     later = across @ covariance @ np.swapaxes(across, -1, -2)
     later[..., range(STATES), range(STATES)] += _shaken(unit) * step[..., None]
     later[..., range(3), range(3)] += unit.force_noise**2 * step[..., None] ** 3 / 3.0
@@ -167,6 +172,11 @@ def with_attitude(state: Reckoning, attitude: Floats, sigma_rad: ArrayLike) -> t
     apart = product(attitude, conjugate)
     apart = apart * np.where(apart[..., :1] < 0.0, -1.0, 1.0)
     return _with(state, 2.0 * apart[..., 1:], _EYE[ATTITUDE], sigma_rad)
+
+
+def with_gyro_bias(state: Reckoning, bias_radps: ArrayLike, sigma_radps: ArrayLike) -> tuple[Reckoning, Innovation]:
+    """With what the gyro's bias is seen to be (..., 3), by another that tells how it turned; sigmas (..., 3)."""
+    return _with(state, np.asarray(bias_radps) - state.rate_bias_radps, _EYE[GYRO], sigma_radps)
 
 
 def with_airspeed(

@@ -1,8 +1,9 @@
 """Whether a vehicle's position source is to be believed: what inertial data deny is refused until it agrees again.
 
 A position, or a velocity, is compared with where the vehicle can be. The hypothesis that was corrected until a second ago
-denies what jumps; those that went on without it for ten to thirty seconds deny what walks off slowly. Either must be sure:
-six sigma of what they know and of what the source usually scatters by, and once more what good sources wander by.
+denies what jumps; those that went on without it for five to twenty seconds deny what walks off slowly. Either must be sure:
+six sigma of what they know and of what the source usually scatters by, and once more what good sources wander by. Where
+neither wings nor wheels hold the velocity, they must have proved as sure as they say (`proving`).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from gateway.estimators import dead_reckoning as dr
 from gateway.estimators.dead_reckoning import Reckoning
 from gateway.estimators.inertial import between
 from gateway.reckon.cells import SECOND_CELLS
+from gateway.reckon.proving import compared, is_proved
 from gateway.reckon.tip import BRANCHES, JUMPED, NOTHING, WALKED_OFF, Tip, hypothesis, with_each, with_hypothesis
 from gateway.settings import DeadReckoning
 
@@ -36,10 +38,10 @@ LEARNS = 0.05  # of each position, for the scatter
 LASTS = 2.0  # how many positions in a row a source's error is the same for, about
 
 
-def judged(tip: Tip, place: Floats, late_s: Floats, tells_walks: Bools, settings: DeadReckoning) -> Tip:
+def judged(tip: Tip, place: Floats, late_s: Floats, held: Bools, unseen: Floats, settings: DeadReckoning) -> Tip:
     """The tips with a position each (n, 9), see `told.PLACE`, told so long (n,) before; refused ones are not worked in.
 
-    `tells_walks` (n,): whether what goes on without GPS may deny what walks off slowly.
+    `held` (n,): whether wings or wheels hold the velocity; `unseen` (n, 3): what shakes the units, m/s2 in a root Hz.
     """
     motion = tip.state.motion
     late = late_s[:, None, None]
@@ -52,7 +54,8 @@ def judged(tip: Tip, place: Floats, late_s: Floats, tells_walks: Bools, settings
     trusted = (tip.cell - tip.began >= TRUSTED_AFTER) & np.array(settings.refuses)
     jumps = trusted & (worst[:, 0] > FAR)
     old = tip.cell[:, None] - tip.seeded[:, 1:] >= OLD_ENOUGH
-    walks = (trusted & tells_walks)[:, None] & old & (worst[:, 1:] > WALKED)
+    bound = np.where(held, WALKED, WALKED * np.maximum(tip.times, 1.0))
+    walks = (trusted & (held | is_proved(tip)))[:, None] & old & (worst[:, 1:] > bound[:, None])
     refused = tip.denied != NOTHING
     agreed = np.where(refused & (worst[:, 0] < NEAR), tip.agreed + 1, 0)
     returns = refused & (agreed >= AGREES_FOR)
@@ -60,7 +63,7 @@ def judged(tip: Tip, place: Floats, late_s: Floats, tells_walks: Bools, settings
     why = np.where(jumps, JUMPED, WALKED_OFF)
     denied = np.where(newly, why, np.where(refused & ~returns, tip.denied, NOTHING))
     state = _of_the_oldest(tip, walks, newly & ~jumps)
-    tip = replace(tip, state=state, denied=denied, agreed=agreed)
+    tip = compared(replace(tip, state=state, denied=denied, agreed=agreed), worst, old, unseen, trusted)
     accepted = np.flatnonzero(denied == NOTHING)
     if not len(accepted):
         return tip

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators import dead_reckoning as dr
-from gateway.estimators.dead_reckoning import Unit
+from gateway.estimators.dead_reckoning import Reckoning, Unit
 from gateway.estimators.inertial import Motion, displaced
 from gateway.reckon.cells import BLOCK, CELL_NS, CELL_S, SECOND_CELLS, Block, Cells
 from gateway.reckon.judging import judged
-from gateway.reckon.ties import SLOWEST_AIR_MPS, Kinds, tied, with_altitude, with_picture
+from gateway.reckon.ties import SLOWEST_AIR_MPS, Kinds, of_some, tied, with_altitude, with_picture
 from gateway.reckon.tip import HYPOTHESES, SEEDED_EVERY, Tip, hypothesis, joined, split_anew, spread, with_hypothesis
 from gateway.settings import DeadReckoning
 
@@ -65,6 +65,9 @@ def begun(at: int, place: Floats, attitude: Floats, settings: DeadReckoning) -> 
         np.zeros(1, np.int64),
         np.zeros(1, np.int64),
         np.zeros((1, 3)),
+        np.zeros(1, np.int64),
+        np.zeros(1),
+        np.zeros(1),
     )
 
 
@@ -91,19 +94,25 @@ def run(tips: Sequence[Tip], inputs: Sequence[Cells], kinds: Kinds, settings: De
 def _through(tip: Tip, told: Block, kinds: Kinds, cell: int, unit: Unit, settings: DeadReckoning) -> Tip:
     """One block further."""
     before = tip.state.motion.velocity_mps[:, 0]
-    rate, noise = _rates(told, settings)
+    rate, noise, gyro = _rates(told, settings)
     more = noise[:, None], UNSEEN_SHARE * told.unseen[:, None, :3]
-    state = dr.carried_through(tip.state, rate[:, None], told.force[:, None], CELL_S, unit, more)
+    state = dr.carried_through(tip.state, rate[:, None], told.force[:, None], CELL_S, unit, more, gyro[:, None])
     accelerated = (state.motion.velocity_mps[:, 0] - before) / (BLOCK * CELL_S)
     end = cell + BLOCK
+    state = _with_bias(state, told, kinds, settings)
     state = tied(state, told, kinds, end, settings)
     tip = replace(tip, state=state, cell=tip.cell + BLOCK, accelerated_mps2=accelerated)
     tip = with_altitude(tip, told, end, settings)
     has_place = np.flatnonzero(~np.isnan(told.place[:, 0]))
     if len(has_place):
-        # of copters and boats what goes on without GPS is not sure enough: it denied good positions of real ones
-        tells_walks = ((kinds.wings | kinds.wheels) & kinds.unit)[has_place]
-        some = judged(tip.taken(has_place), told.place[has_place], told.place_late[has_place], tells_walks, settings)
+        some = judged(
+            tip.taken(has_place),
+            told.place[has_place],
+            told.place_late[has_place],
+            (kinds.unit & (kinds.wings | kinds.wheels))[has_place],
+            told.unseen[has_place, :3],
+            settings,
+        )
         tip = tip.put(has_place, some)
     is_pictured = np.flatnonzero(~np.isnan(told.pictured[:, 0]))
     if len(is_pictured):
@@ -122,12 +131,23 @@ def _through(tip: Tip, told: Block, kinds: Kinds, cell: int, unit: Unit, setting
     return tip
 
 
-def _rates(told: Block, settings: DeadReckoning) -> tuple[Floats, Floats]:
-    """The rates that vehicles turned by (n, m, 3), and their noise in a root Hz (n, 3): their gyros', or their autopilots' if
-    these have seen more of them than has been told.
+def _rates(told: Block, settings: DeadReckoning) -> tuple[Floats, Floats, Floats]:
+    """The rates that vehicles turned by (n, m, 3), their noise in a root Hz (n, 3), and whether they are gyros' (n,): or else
+    their autopilots', if these have seen more of them than has been told. Autopilots' have no bias left.
     """
     unseen = UNSEEN_SHARE * told.unseen[:, 3:]
     is_told = ~np.isnan(told.turned).any(axis=(1, 2))
     better = is_told & (np.sqrt(np.mean(unseen**2, axis=1)) > settings.attitude_wanders)
     rate = np.where(better[:, None, None], told.turned, told.rate)
-    return rate, np.where(better[:, None], settings.attitude_wanders, unseen)
+    return rate, np.where(better[:, None], settings.attitude_wanders, unseen), 1.0 - better
+
+
+def _with_bias(state: Reckoning, told: Block, kinds: Kinds, settings: DeadReckoning) -> Reckoning:
+    """With what gyros tell beyond what the autopilots' attitudes turned by meanwhile: that is their bias."""
+    rows = np.flatnonzero(kinds.unit & ~np.isnan(told.turned).any(axis=(1, 2)))
+    if not len(rows):
+        return state
+    bias = np.mean(told.rate[rows] - told.turned[rows], axis=1)
+    power = settings.attitude_wanders**2 + (UNSEEN_SHARE * told.unseen[rows, 3:]) ** 2
+    sigma = np.sqrt(power / (BLOCK * CELL_S))
+    return of_some(state, rows, lambda some: dr.with_gyro_bias(some, bias[:, None], sigma[:, None])[0])

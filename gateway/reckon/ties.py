@@ -65,24 +65,24 @@ def tied(state: Reckoning, told: Block, kinds: Kinds, cell: int, settings: DeadR
         # an error that lasts for so many samples tells as much as one sample of it in that time
         lasting = math.sqrt(2.0 * LASTS_S / (ATTITUDE_EVERY * CELL_S))
         sigma = settings.attitude_sigma_rad * np.array([1.0, 1.0, 2.0]) * lasting
-        state = _of_some(state, rows, lambda some: dr.with_attitude(some, told.attitude[rows][:, None], sigma)[0])
+        state = of_some(state, rows, lambda some: dr.with_attitude(some, told.attitude[rows][:, None], sigma)[0])
     rows = np.flatnonzero(kinds.wheels)
     slip = settings.slip_mps
-    state = _of_some(state, rows, lambda some: dr.with_wheels(some, np.array([slip, slip]))[0])
+    state = of_some(state, rows, lambda some: dr.with_wheels(some, np.array([slip, slip]))[0])
     rows = np.flatnonzero(kinds.hull)
-    state = _of_some(state, rows, lambda some: dr.with_wheels(some, np.array([5.0 * slip, 5.0 * slip]))[0])
+    state = of_some(state, rows, lambda some: dr.with_wheels(some, np.array([5.0 * slip, 5.0 * slip]))[0])
     rows = np.flatnonzero(kinds.wings & (told.airspeed > SLOWEST_AIR_MPS))
     if len(rows):
         height = state.motion.height_m[rows]
         fast = true_airspeed_mps(told.airspeed[rows][:, None], height)
         sigma_mps = settings.airspeed_sigma_mps * math.sqrt(2.0 * 2.0 / (BLOCK * CELL_S))
-        state = _of_some(
+        state = of_some(
             state, rows, lambda some: dr.with_airspeed(some, fast, sigma_mps, settings.sideslip_sigma_mps)[0]
         )
     return state
 
 
-def _of_some(state: Reckoning, rows: Ints, tie: Callable[[Reckoning], Reckoning]) -> Reckoning:
+def of_some(state: Reckoning, rows: Ints, tie: Callable[[Reckoning], Reckoning]) -> Reckoning:
     """States of which some are tied to something."""
     if not len(rows):
         return state
@@ -123,7 +123,7 @@ def with_altitude(tip: Tip, told: Block, cell: int, settings: DeadReckoning) -> 
         motion = state.motion
         return dr.with_place(state, motion.latitude_rad, motion.longitude_rad, height, (_LOOSE_M, _LOOSE_M, sigma))[0]
 
-    return replace(tip, state=_of_some(tip.state, mine, tie))
+    return replace(tip, state=of_some(tip.state, mine, tie))
 
 
 def with_picture(tip: Tip, told: Block, rows: Ints) -> Tip:
@@ -143,4 +143,4 @@ def with_picture(tip: Tip, told: Block, rows: Ints) -> Tip:
     def tie(state: Reckoning) -> Reckoning:
         return dr.with_place(state, latitude[chosen], longitude[chosen], height[chosen], sigma)[0]
 
-    return replace(tip, state=_of_some(tip.state, chosen, tie))
+    return replace(tip, state=of_some(tip.state, chosen, tie))

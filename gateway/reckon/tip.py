@@ -41,6 +41,9 @@ class Tip:
     denied: Ints  # (n,) why positions are refused; NOTHING = they are not
     agreed: Ints  # (n,) how many that are refused have agreed in a row
     accelerated_mps2: Floats  # (n, 3) north, east, down, in the last cell
+    proved: Ints  # (n,) comparisons of good positions with the oldest hypothesis
+    times: Floats  # (n,) the mean square that they were off by, of what is expected
+    rough: Floats  # (n,) the power of what is not told of the forces between samples, in these
 
     def __len__(self) -> int:
         return len(self.cell)

@@ -119,8 +119,8 @@ class DeadReckoning:
     """
 
     gyro_noise: float = math.radians(0.03)  # rad/s
-    gyro_bias_radps: float = math.radians(0.3)
-    gyro_bias_wanders: float = 1e-5  # rad/s
+    gyro_bias_radps: float = math.radians(1.0)
+    gyro_bias_wanders: float = 1e-4  # rad/s
     accelerometer_noise: float = 0.05  # m/s2
     accelerometer_bias_mps2: float = 0.2
     accelerometer_bias_wanders: float = 1e-3  # m/s2
