@@ -113,12 +113,26 @@ def _show(found: Sequence[Score], against: dict[str, str]) -> None:
     for one in found:
         numbers = (one.rms_m, one.straight_on_rms_m, one.along_rms_m, one.across_rms_m, one.height_rms_m)
         name, group = ("" if one.group == group else one.group), one.group
-        shares = [f"{100 * first:.0f}  {100 * second:.0f}" for first, second in (one.along_within, one.across_within)]
+        shares = [_share(one.along_within, one.along_independent), _share(one.across_within, one.across_independent)]
         cells = ["-" if math.isnan(value) else f"{value:.1f}" for value in numbers]
         table.add_row(name, f"{one.horizon_s:g}", str(one.count), *cells, *shares)
     console.print(table)
+    console.print(_HONEST, soft_wrap=True, markup=False)
     for what, who in against.items():
         console.print(f"{what}: {who}", soft_wrap=True, markup=False)
+
+
+_HONEST = (
+    "68 and 95 % are honest. ± is one standard error of 68 % found in so many predictions as differ from each other: "
+    "those a second apart are nearly the same."
+)
+
+
+def _share(within: tuple[float, float], independent: float) -> str:
+    """Of those within one sigma how far an honest share may be off by chance, and those within two."""
+    from gateway.offline.score import standard_error
+
+    return f"{100 * within[0]:.0f} ±{100 * standard_error(0.68, independent):.0f}  {100 * within[1]:.0f}"
 
 
 def _show_each(names: Sequence[str], sessions: Sequence[Sequence[Score]], together: Sequence[Score]) -> None:

@@ -45,4 +45,6 @@ def _joined(group: str, horizon_s: float, rows: Sequence[Score]) -> Score:
         sum(heights),
         (share(lambda row: row.along_within[0]), share(lambda row: row.along_within[1])),
         (share(lambda row: row.across_within[0]), share(lambda row: row.across_within[1])),
+        math.fsum(row.along_independent for row in rows),
+        math.fsum(row.across_independent for row in rows),
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,21 +85,11 @@ class Errors:
     turned: Bools  # the course changed in the meantime
     method: NDArray[np.str_]
     kind: NDArray[np.str_]
+    part: Ints  # whose they are: 0 of one track, numbered where several are `joined`
 
     def chosen(self, rows: Bools) -> Errors:
         """Some of them."""
-        return Errors(
-            self.horizon_s[rows],
-            self.along_m[rows],
-            self.across_m[rows],
-            self.height_m[rows],
-            self.along_sigmas[rows],
-            self.across_sigmas[rows],
-            self.straight_on_m[rows],
-            self.turned[rows],
-            self.method[rows],
-            self.kind[rows],
-        )
+        return Errors(*(getattr(self, one.name)[rows] for one in fields(self)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +107,8 @@ class Score:
     heights: int  # of how many predictions both heights are known
     along_within: tuple[float, float]
     across_within: tuple[float, float]
+    along_independent: float  # how many independent predictions the share within one sigma is worth
+    across_independent: float
 
 
 def errors(told: Foretold, came: Way, known: Way) -> Errors:
@@ -147,16 +139,18 @@ def errors(told: Foretold, came: Way, known: Way) -> Errors:
         np.abs(wrap_rad(after - before)) > TURNED_RAD,
         told.method,
         told.kind,
+        np.zeros(len(along), dtype=np.int64),
     )
     return found.chosen(~np.isnan(along) & ~np.isnan(found.straight_on_m) & moving)
 
 
 def joined(parts: Sequence[Errors]) -> Errors:
     """The errors of several tracks as one."""
-    nothing, words = np.zeros(0), np.zeros(0, dtype="U16")
+    nothing, words, whole = np.zeros(0), np.zeros(0, dtype="U16"), np.zeros(0, dtype=np.int64)
     none = np.zeros(0, dtype=np.bool_)
-    empty = Errors(nothing, nothing, nothing, nothing, nothing, nothing, nothing, none, words, words)
-    return Errors(*(np.concatenate([getattr(part, one.name) for part in (empty, *parts)]) for one in fields(empty)))
+    empty = Errors(nothing, nothing, nothing, nothing, nothing, nothing, nothing, none, words, words, whole)
+    numbered = [replace(part, part=np.full(len(part.part), number)) for number, part in enumerate(parts)]
+    return Errors(*(np.concatenate([getattr(part, one.name) for part in (empty, *numbered)]) for one in fields(empty)))
 
 
 def scores(found: Errors) -> list[Score]:
@@ -192,7 +186,35 @@ def _score(group: str, horizon_s: float, some: Errors) -> Score:
         len(height),
         _within(some.along_sigmas),
         _within(some.across_sigmas),
+        _independent(some.along_sigmas, some.part),
+        _independent(some.across_sigmas, some.part),
     )
+
+
+def standard_error(share: float, independent: float) -> float:
+    """Of a share that was found in so many independent predictions, if it is true."""
+    return math.sqrt(share * (1.0 - share) / independent) if independent > 0.0 else math.nan
+
+
+def _independent(sigmas: Floats, part: Ints) -> float:
+    """How many independent values "within one sigma" (n,) is worth: predictions a second apart are nearly the same.
+
+    Each track's count over 1 + 2 x the sum of its autocorrelation, up to where that is first not positive. Who is always
+    within, or never, tells once.
+    """
+    worth = 0.0
+    for one in np.unique(part):
+        within = (sigmas[part == one] <= 1.0).astype(np.float64)
+        off = within - within.mean()
+        power = float(off @ off)
+        if power == 0.0:
+            worth += 1.0
+            continue
+        correlation = np.correlate(off, off, "full")[len(off) :] / power
+        ends = np.flatnonzero(correlation <= 0.0)
+        last = int(ends[0]) if len(ends) else len(correlation)
+        worth += len(off) / (1.0 + 2.0 * float(correlation[:last].sum()))
+    return worth
 
 
 def _rms(values: Floats) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gateway.offline.pooled import pooled
-from gateway.offline.score import Errors, Foretold, Way, errors, joined, scores
+from gateway.offline.score import Errors, Foretold, Way, errors, joined, scores, standard_error
 
 SECOND = 1_000_000_000
 LATITUDE, LONGITUDE, RADIUS_M = 0.541, 1.815, 6_370_000.0
@@ -82,6 +82,24 @@ def test_rows_count_what_lies_within_one_and_two_sigmas() -> None:
     assert rows[0].along_within == pytest.approx((1 / 3, 2 / 3))
     assert rows[0].across_within == (1.0, 1.0)
     assert rows[0].rms_m == pytest.approx(math.sqrt((25 + 225 + 900) / 3), rel=0.02)
+
+
+def test_predictions_that_are_alike_tell_once() -> None:
+    """Eight runs of ten that are all within or all without tell about as much as eight; a track that is always within, once."""
+    made = list(range(80))
+    alike, alone = foretold(made, 10.0, 0.0, 0.0), foretold(made, 10.0, 0.0, 0.0)
+    draws = np.random.default_rng(1).random(80) < 0.5
+    off_m = np.where(np.repeat([0, 1, 0, 0, 1, 1, 0, 1], 10), 15.0, 1.0), np.where(draws, 15.0, 1.0)
+    parts = [
+        errors(replace(told, latitude=told.latitude + off / RADIUS_M), way(120), way(120))
+        for told, off in zip((alike, alone), off_m, strict=True)
+    ]
+    runs, each = (scores(joined([part]))[0] for part in parts)
+    assert 3.0 < runs.along_independent < 16.0
+    assert 40.0 < each.along_independent <= 80.0
+    assert runs.across_independent == 1.0
+    assert scores(joined(parts))[0].across_independent == 2.0
+    assert standard_error(0.68, 100.0) == pytest.approx(0.0466, abs=1e-3)
 
 
 def test_nothing_foretold_has_no_rows() -> None:
