@@ -12,12 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gateway.align import SECOND
-from gateway.predict.ways import STEP_S, Ways, at_instant, sigmas_at
+from gateway.predict.ways import STEP_S, Case, Ways, at_instant, cases_at
 from gateway.settings import Separation
 
 Floats = NDArray[np.float64]
@@ -87,9 +88,12 @@ def encounters(near: Near, separation: Separation) -> Encounters:
 
 
 def _level(place: Floats, has_height: Bools, least_height_m: float) -> Floats:
-    """Places with heights above the curved ground; NaN where nobody is probed. Who has no height may be at any."""
+    """Places with heights above the curved ground; NaN where nobody is probed. Who has no height may be at any.
+
+    Who is too low now is not probed later either: whether he takes off, and when, does not show before he has.
+    """
     up = place[..., 2] + (place[..., 0] ** 2 + place[..., 1] ** 2) / (2.0 * EARTH_M)
-    flies = (up >= least_height_m) | ~has_height[:, None]
+    flies = (up >= least_height_m) & (up[:, :1] >= least_height_m) | ~has_height[:, None]
     return np.where(flies[..., None], np.stack([place[..., 0], place[..., 1], up], axis=-1), np.nan)
 
 
@@ -227,9 +231,9 @@ def _told(
     ]
     way, drift = there[1] - there[0], velocity[met.second, met.grid] - velocity[met.first, met.grid]
     level = ways.has_height[met.first] & ways.has_height[met.second]
-    one, up_one = sigmas_at(ways, met.first, closest_at)
-    two, up_two = sigmas_at(ways, met.second, closest_at)
-    chance = _chance(way[:, :2], drift[:, :2], one + two, closest_s, separation)
+    one, up_one = cases_at(ways, met.first, closest_at)
+    two, up_two = cases_at(ways, met.second, closest_at)
+    chance = _chance_of_all(way[:, :2], drift[:, :2], one, two, closest_s, separation)
     above = _normal(way[:, 2], np.sqrt(up_one + up_two), -separation.vertical_m, separation.vertical_m)
     for side in there:  # back into the frame that is flat
         side[:, 2] -= (side[:, 0] ** 2 + side[:, 1] ** 2) / (2.0 * EARTH_M)
@@ -243,6 +247,19 @@ def _told(
         chance * np.where(level, above, 1.0),
         np.stack(there, axis=1),
     )
+
+
+def _chance_of_all(
+    way: Floats, drift: Floats, one: Sequence[Case], two: Sequence[Case], closest_s: Floats, separation: Separation
+) -> Floats:
+    """As `_chance`, whichever of some things each of both does."""
+    chance = np.zeros(len(way))
+    for first, second in product(one, two):
+        probability = first.probability * second.probability
+        some = np.flatnonzero(probability)
+        covariance = first.covariance[some] + second.covariance[some]
+        chance[some] += probability[some] * _chance(way[some], drift[some], covariance, closest_s[some], separation)
+    return chance
 
 
 def _chance(way: Floats, drift: Floats, covariance: Floats, closest_s: Floats, separation: Separation) -> Floats:

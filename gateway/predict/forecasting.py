@@ -20,7 +20,7 @@ from gateway.predict import weather
 from gateway.predict.aboard import carried, on_deck
 from gateway.predict.candidates import weighed
 from gateway.predict.choosing import Chosen, chosen
-from gateway.predict.gates import Gates, Judged
+from gateway.predict.finals import Gates, Judged
 from gateway.predict.goals import RUNWAY
 from gateway.predict.heights import heights
 from gateway.predict.hindsight import MOVING_MPS, kept, learnt, scaled
@@ -75,12 +75,12 @@ def forecast(
     tracks, numbers = tuple([lane.track for lane in lanes]), tuple([lane.number for lane in lanes])
     before = predicting.remembered.of(tracks)
     state = State.of(lanes, at, model)
-    gates, judged = _on_final(predicting.gates, tracks, numbers, lanes, at, state, site, frame)
+    winds = _winds(predicting, lanes, at)
+    gates, judged = _on_final(predicting.gates, tracks, numbers, lanes, at, state, winds, site, frame)
     goals = on_deck(goals, lanes, at, state, frame)
     goals = goals if predicting.flows is None else predicting.flows.along(goals, state)
     goals = weather.around(goals, state, weather.areas(predicting.tellings, site, frame, at, separation_m))
     predicting, stacked = predicting.stacked(lanes[0].track, goals)
-    winds = _winds(predicting, lanes, at)
     now, minds = _motions(before, at, state, stacked, winds, site)
     way, minds = chosen(before, minds, at, now, stacked, state.climb, frame)
     horizons = state.since_s[:, None] + np.array(horizons_s)
@@ -98,7 +98,7 @@ def forecast(
     mean = np.concatenate([ahead.position, up[..., None]], axis=2)
     known_s, reported = around - state.since_s[:, None], np.array([lane.aircraft is not None for lane in lanes])
     settled = np.array([lane.aircraft is not None or at - lane.began >= SETTLES for lane in lanes])
-    ways = ways_of(numbers, at, state, whole, known_s, up, sigma, horizons_s, by_points, settled, reported, frame)
+    ways = ways_of(numbers, at, state, now, whole, known_s, up, sigma, horizons_s, by_points, settled, reported, frame)
     told_names = [one.names[best] if best >= 0 else None for one, best in zip(goals, way.best.tolist(), strict=True)]
     made = Forecast(
         at,
@@ -194,6 +194,7 @@ def _on_final(
     lanes: Sequence[Lane],
     at: int,
     state: State,
+    winds: Floats,
     site: Site,
     frame: RunwayFrame,
 ) -> tuple[Gates, Judged | None]:
@@ -201,7 +202,7 @@ def _on_final(
     place = np.concatenate([state.position, (state.up + state.climb * state.since_s)[:, None]], axis=1)
     velocity = np.concatenate([state.velocity, state.climb[:, None]], axis=1)
     aircraft = [lane.aircraft for lane in lanes]
-    return gates.judged(at, tracks, numbers, aircraft, place, velocity, state.has_height, site.stabilised, frame)
+    return gates.judged(at, tracks, numbers, aircraft, place, velocity, winds, state.has_height, site.stabilised, frame)
 
 
 def _rests(way: Chosen, whole: two_segment.Ahead) -> Ints:

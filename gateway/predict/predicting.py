@@ -12,7 +12,7 @@ from gateway.frames import RunwayFrame
 from gateway.fuse import Headings, Lane
 from gateway.observation import WeatherArea
 from gateway.predict.arrival_flows import FlowWays
-from gateway.predict.gates import Gates
+from gateway.predict.finals import Gates
 from gateway.predict.goals import Goals, goals_of
 from gateway.predict.minds import Remembered
 from gateway.predict.stacked import Stacked

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND
 from gateway.frames import RunwayFrame, turn
-from gateway.predict import candidates, conflicts, gates
+from gateway.predict import candidates, conflicts, finals
 from gateway.predict.candidates import NO_CANDIDATES, Candidates, Weighed
 from gateway.predict.conflicts import NONE_FOUND, Conflicts
-from gateway.predict.gates import NONE_JUDGED, GateAlerts
+from gateway.predict.finals import NONE_JUDGED, GateAlerts
 from gateway.predict.ways import Ways
 
 Floats = NDArray[np.float64]
@@ -69,7 +69,7 @@ class Forecast:
     kind: Ints  # (t,) 0 none, 1 inferred, 2 declared
     confidence: Floats  # (t,)
     ways: Ways
-    judged: gates.Judged | None = None
+    judged: finals.Judged | None = None
     weighed: Weighed | None = None
 
 
@@ -102,7 +102,7 @@ def table(forecasts: Sequence[Forecast], frame: RunwayFrame, rounds: Sequence[co
         sigma_across_m=across,
         course_rad=np.remainder(0.5 * math.pi - _joined([f.course for f in forecasts]), 2.0 * math.pi),
         conflicts=conflicts.table(rounds, frame) if rounds else NONE_FOUND,
-        gates=gates.table([one.judged for one in forecasts if one.judged is not None]),
+        gates=finals.table([one.judged for one in forecasts if one.judged is not None]),
         candidates=candidates.table([one.weighed for one in forecasts if one.weighed is not None], frame),
     )
 

@@ -14,6 +14,7 @@ from gateway.estimators.two_segment import Ahead
 from gateway.frames import RunwayFrame, turn
 from gateway.predict.spread import Spread
 from gateway.predict.states import State
+from gateway.predict.thinking import STALE_S, TURNS_RAD, Motions
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -26,6 +27,9 @@ ABOVE_GLIDE_PATH_M = 150.0  # from no higher than this
 CROSSES = math.tan(math.radians(20.0))  # at more than this angle it is crossed, and not flown along
 MOST_TURNED_RAD = 5.0  # between two points of a path; who turns further is drawn through the middle of its circle
 LEVELS_OFF, CLIMBS_MPS = 0.2, 0.3  # a climb may change by this share of it, and who is level may begin to climb
+# Straight flight goes on for so long in the mean, however long it has lasted; meanwhile a course is off by so much, and the
+# speed wanders, as a share of it, rad2/s of the place along. Measured on arrivals to Paris: docs/papers/000-intent.md.
+STRAIGHT_S, KEEPS_RAD, SLOWS = 240.0, 0.01, 3e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +45,7 @@ class Ways:
     upright: Floats
     has_height: Bools  # (n,)
     reported: Bools  # (n,) whether an aircraft says where it is; others only a radar sees
+    straight_mps: Floats  # (n,) ground speed of who flies straight, and nobody knows for how long; NaN of others
 
     def taken(self, rows: Ints | Bools) -> Ways:
         """Some of the rows."""
@@ -62,6 +67,7 @@ def ways_of(
     tracks: Sequence[int],
     made: int,
     state: State,
+    now: Motions,
     whole: Ahead,
     known_s: Floats,
     up: Floats,
@@ -91,8 +97,10 @@ def ways_of(
     beyond = (np.abs(course - course[:, :1]) > FREE_TURN_RAD) & ~by_points[:, None]
     place[beyond | _joins_final(place, frame) & ~by_points[:, None]] = np.nan
     place[~settled] = np.nan
-    at = np.full(len(tracks), made, dtype=np.int64)
-    return Ways(np.array(tracks, dtype=np.int64), at, place, course, along, across, upright, state.has_height, reported)
+    at, numbers = np.full(len(tracks), made, dtype=np.int64), np.array(tracks, dtype=np.int64)
+    straight = ~by_points & (now.side == 0) & (now.unsettled < TURNS_RAD) & (state.since_s <= STALE_S)
+    straight_mps = np.where(straight, now.speed, math.nan)
+    return Ways(numbers, at, place, course, along, across, upright, state.has_height, reported, straight_mps)
 
 
 def _joins_final(place: Floats, frame: RunwayFrame) -> Bools:
@@ -164,18 +172,40 @@ def at_instant(ways: Ways, at: int, times_s: Floats) -> Floats:
     return np.where(beyond[..., None], np.nan, one * (1.0 - share) + two * share)
 
 
-def sigmas_at(ways: Ways, rows: Ints, at: Ints) -> tuple[Floats, Floats]:
-    """Covariances (k, 2, 2) and upright variances (k,) of some rows (k,) at instants (k,) ns, by the nearest of the grid."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Case:
+    """One of the things that k aircraft may do: with what probability (k,), and the covariance of the place then (k, 2, 2)."""
+
+    probability: Floats
+    covariance: Floats
+
+
+def cases_at(ways: Ways, rows: Ints, at: Ints) -> tuple[tuple[Case, Case], Floats]:
+    """What some rows (k,) may do until instants (k,) ns, by the nearest of the grid, and upright variances (k,) then.
+
+    Who flies straight goes on so, or turns some time. Both together have the sigmas that are foretold, but who goes on is
+    hardly off his way, and who turns is farther off than those say.
+    """
     last = ways.place.shape[1] - 1
-    near = np.clip(np.rint((at - ways.made[rows]) / (STEP_S * SECOND)), 0, last).astype(np.int64)
+    since_s = (at - ways.made[rows]) / SECOND
+    near = np.clip(np.rint(since_s / STEP_S), 0, last).astype(np.int64)
     along, across, course = (column[rows, near] for column in (ways.along, ways.across, ways.course))
+    speed, here = ways.straight_mps[rows], ways.along[rows, 0] ** 2
+    goes_on = np.where(np.isnan(speed), 0.0, np.exp(-np.maximum(since_s, 0.0) / STRAIGHT_S))
+    cases = []
+    wanders = here + SLOWS * speed * speed * since_s**3, here + (KEEPS_RAD * speed * since_s) ** 2
+    squares = along * along, across * across
+    straight = [np.fmin(small, square) for small, square in zip(wanders, squares, strict=True)]
+    others = [(square - goes_on * small) / (1.0 - goes_on) for square, small in zip(squares, straight, strict=True)]
+    for probability, (first, second) in ((goes_on, straight), (1.0 - goes_on, others)):
+        cases.append(Case(probability, _turned(first, second, course)))
+    return (cases[0], cases[1]), ways.upright[rows, near] ** 2
+
+
+def _turned(along: Floats, across: Floats, course: Floats) -> Floats:
+    """Covariances (k, 2, 2) east and north of variances (k,) along and across courses (k,)."""
     cosine, sine = np.cos(course), np.sin(course)
-    first, second = along * along, across * across
-    mixed = (first - second) * sine * cosine
-    level = [
-        first * cosine * cosine + second * sine * sine,
-        mixed,
-        mixed,
-        first * sine * sine + second * cosine * cosine,
-    ]
-    return np.stack(level, axis=-1).reshape(-1, 2, 2), ways.upright[rows, near] ** 2
+    mixed = (along - across) * sine * cosine
+    level = [along * cosine * cosine + across * sine * sine, mixed]
+    level += [mixed, along * sine * sine + across * cosine * cosine]
+    return np.stack(level, axis=-1).reshape(-1, 2, 2)

@@ -31,10 +31,11 @@ class Stabilised:
 
     upper_gate_m: float | None = None
     lower_gate_m: float | None = None
-    approach_speed_mps: float | None = None  # ground speed; None: the least that the vehicle has flown on this final
+    approach_speed_mps: float | None = None  # None: the least that the vehicle has flown on this final
     glide_path_rad: float = math.radians(0.5)  # above or below, seen from where it meets the runway
     centreline_rad: float = math.radians(1.25)  # to either side, likewise
     least_vertical_m: float = 10.0  # nearer to the runway than where the angles are so much, these hold
     least_lateral_m: float = 20.0
     speed_share: float = 0.15  # faster than the approach speed by this share of it
+    slow_share: float = 0.05  # or slower
     least_fast_mps: float = 3.0  # or by this, where the share is less: gusts

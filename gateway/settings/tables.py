@@ -159,6 +159,7 @@ TABLES: dict[str, Table] = {
             "least_vertical_m": ("least_vertical_m", number(0.0, 1e3)),
             "least_lateral_m": ("least_lateral_m", number(0.0, 1e3)),
             "speed_share": ("speed_share", number(0.01, 10.0)),
+            "slow_share": ("slow_share", number(0.01, 1.0)),
             "least_fast_mps": ("least_fast_mps", number(0.0, 100.0)),
         }
     ),

@@ -118,7 +118,8 @@ def _stabilised(chosen: Stabilised) -> list[str]:
         ("least_vertical_m", chosen.least_vertical_m, usual.least_vertical_m, "near the runway"),
         ("least_lateral_m", chosen.least_lateral_m, usual.least_lateral_m, ""),
         ("speed_share", chosen.speed_share, usual.speed_share, "faster than the approach speed"),
-        ("least_fast_mps", chosen.least_fast_mps, usual.least_fast_mps, ""),
+        ("slow_share", chosen.slow_share, usual.slow_share, "slower than approach_speed_mps"),
+        ("least_fast_mps", chosen.least_fast_mps, usual.least_fast_mps, "faster or slower"),
     )
     given = (
         ("upper_gate_m", chosen.upper_gate_m, 305, "above the runway; by default 83 s to go"),

@@ -36,7 +36,8 @@ def ways(places: Sequence[Sequence[float]], velocities: Sequence[Sequence[float]
     sigma = np.full((n, ROWS), sigma_m)
     yes = np.ones(n, dtype=np.bool_)
     path = place[:, None] + times * velocity[:, None]
-    return Ways(np.arange(1, n + 1), np.full(n, T0), path, course, sigma, sigma, sigma, yes, yes)
+    nobody = np.full(n, math.nan)  # flies straight without a way that he has told
+    return Ways(np.arange(1, n + 1), np.full(n, T0), path, course, sigma, sigma, sigma, yes, yes, nobody)
 
 
 def test_a_crossing_is_found_with_its_time_its_place_and_how_near() -> None:
@@ -77,6 +78,30 @@ def test_the_probability_is_the_share_of_draws_that_come_too_near() -> None:
     way = start[:, 1, None] - start[:, 0, None] + times[:, None] * (np.array([0, 90.0, 0]) - np.array([90.0, 0, 0]))
     near = (np.hypot(way[..., 0], way[..., 1]) < 1220.0) & (np.abs(way[..., 2]) < 140.0)
     assert told == pytest.approx(near.any(axis=1).mean(), abs=0.03)
+
+
+def test_who_flies_straight_mostly_goes_on() -> None:
+    """Two that meet head-on in 60 s, of whom nobody knows whether they turn: as many pairs lose separation as both fly on.
+
+    Who turns is anywhere: the sigmas are 4 km. Straight flight goes on for 60 s with exp(-60 / 240).
+    """
+    both = ways([[0, 0, 1000.0], [9600.0, 0, 1000.0]], [[80.0, 0, 0], [-80.0, 0, 0]], 4000.0)
+    both = replace(both, upright=np.full((2, ROWS), 1.0))
+    both.along[:, 0] = 10.0
+    anywhere = encounters(near_each_other(both, T0, Separation()), Separation()).probability[0]
+    straight = replace(both, straight_mps=np.array([80.0, 80.0]))
+    told = encounters(near_each_other(straight, T0, Separation()), Separation()).probability[0]
+    assert anywhere < 0.2
+    assert math.exp(-2 * 60 / 240.0) < told < math.exp(-2 * 60 / 240.0) + anywhere
+
+
+def test_nobody_on_the_ground_is_probed_even_if_he_seems_to_climb() -> None:
+    """One stands 20 m above the runway, as its source says, and seems to climb at 1.5 m/s: no conflict. At 40 m it is one."""
+    place, velocity = [[0, 0, 20.0], [6000.0, 0, 60.0]], [[5.0, 0, 1.5], [-80.0, 0, 0]]
+    grounded = encounters(near_each_other(ways(place, velocity), T0, Separation()), Separation())
+    assert not len(grounded.ratio)
+    place[0][2] = 40.0
+    assert len(encounters(near_each_other(ways(place, velocity), T0, Separation()), Separation()).ratio) == 1
 
 
 def test_neighbours_are_those_of_all_pairs() -> None:

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gateway.frames import RunwayFrame
-from gateway.observation import GpsReport, Heard
+from gateway.frames import RunwayFrame, turn
+from gateway.observation import AirData, GpsReport, Heard
 from gateway.picture import Event, Picture
 from gateway.pipeline import initial, step
 from gateway.predict.gates import KINDS, alerts, excess, gate_heights
@@ -24,20 +24,20 @@ LIMITS = Stabilised(approach_speed_mps=70.0)
 
 
 def test_each_kind_is_too_much_just_beyond_its_limit() -> None:
-    """4 km before the threshold half a degree in height, 1.25 degrees to the side and 15 % in speed are the limits."""
+    """4 km before the threshold half a degree in height, 1.25 to the side, 15 % more and 5 % less speed are the limits."""
     before_aim = 4000.0 + RUNWAY.aiming_point_x_m - RUNWAY.threshold_x_m
     high, wide = before_aim * math.tan(math.radians(0.5)), before_aim * math.tan(math.radians(1.25))
     for share in (0.99, 1.01):
         off = excess(
             LIMITS,
             RUNWAY,
-            [4000.0] * 4,
-            [share * high, -share * high, 0.0, 0.0],
-            [0.0, 0.0, -share * wide, 0.0],
-            [70.0, 70.0, 70.0, 70.0 * (1.0 + 0.15 * share)],
-            [70.0] * 4,
+            [4000.0] * 5,
+            [share * high, -share * high, 0.0, 0.0, 0.0],
+            [0.0, 0.0, -share * wide, 0.0, 0.0],
+            [70.0, 70.0, 70.0, 70.0 * (1.0 + 0.15 * share), 70.0 * (1.0 - 0.05 * share)],
+            [70.0] * 5,
         )
-        assert np.diagonal(off.ratio).tolist() == pytest.approx([share] * 4)
+        assert np.diagonal(off.ratio).tolist() == pytest.approx([share] * 5)
 
 
 def test_near_the_runway_the_least_lengths_hold() -> None:
@@ -68,10 +68,15 @@ def test_alerts_last_and_do_not_flicker() -> None:
 
 
 def fly(
-    height: Callable[[float], float], side: Callable[[float], float], speed: float = 70.0, limits: Stabilised = LIMITS
+    height: Callable[[float], float],
+    side: Callable[[float], float],
+    speed: float = 70.0,
+    limits: Stabilised = LIMITS,
+    headwind: float | None = None,
 ) -> list[Picture]:
-    """Down the final from 8 km, so much above the glide path and to the left at each second."""
+    """Down the final from 8 km, so much above the glide path and to the left at each second; the wind is told or not."""
     site, frame, heard = replace(DEMO_SITE, stabilised=limits), RunwayFrame(RUNWAY), []
+    along = turn(frame.enu_from_runway, np.array([1.0, 0.0, 0.0]))
     for k in range(int(7800.0 / speed)):
         before = 8000.0 - speed * k
         place = [RUNWAY.aiming_point_x_m - before, side(before), before * SLOPE + height(before)]
@@ -79,6 +84,9 @@ def fly(
         at = T0 + k * SECOND
         told = GpsReport("mavlink:1", at, at, latitude, longitude, None, up, speed, 0.0, -speed * SLOPE, 3.0, 3.0, 0.3)
         heard.append(Heard(at + 1000, (told,)))
+        if headwind is not None:
+            east, north, _ = (-headwind * along).tolist()
+            heard.append(Heard(at + 2000, (AirData("mavlink:1", at, at, wind_east_mps=east, wind_north_mps=north),)))
     _, picture = step(initial(site, Options()), [*heard, Heard(heard[-1].now + SECOND)])
     return [picture]
 
@@ -113,7 +121,22 @@ def test_a_gate_that_is_passed_unstabilised_says_why() -> None:
     """20 % too fast all the way: told at the first gate and at the second."""
     told = [event for event in said(fly(lambda before: 0.0, lambda before: 0.0, 84.0)) if "gate at" in event.text]
     assert [event.level for event in told] == ["warning", "warning"] or told[1].level == "warning"
-    assert "not stabilised: 14 m/s too fast" in told[-1].text
+    assert "not stabilised: 14 m/s too fast over the ground" in told[-1].text
+
+
+def test_the_speed_through_the_air_counts_where_the_wind_is_known() -> None:
+    """62 m/s over the ground are too slow; in a headwind of 8 m/s that it tells they are right, in one of 24 too fast."""
+    texts = []
+    for headwind in (None, 8.0, 24.0):
+        texts.append(" ".join(event.text for event in said(fly(level, level, 62.0, headwind=headwind))))
+    assert "8 m/s too slow over the ground" in texts[0]
+    assert " too " not in texts[1]
+    assert "16 m/s too fast through the air" in texts[2]
+
+
+def level(before: float) -> float:
+    """As it should be."""
+    return 0.0
 
 
 def test_one_who_crosses_the_final_is_not_judged() -> None:
@@ -132,4 +155,4 @@ def test_one_who_crosses_the_final_is_not_judged() -> None:
 
 def test_the_kinds_have_their_names() -> None:
     """As people and reports call them."""
-    assert KINDS == ("too high", "too low", "off centreline", "too fast")
+    assert KINDS == ("too high", "too low", "off centreline", "too fast", "too slow")

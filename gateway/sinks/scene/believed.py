@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from gateway.frames import RunwayFrame
 from gateway.picture import Picture
 from gateway.predict import Candidates
-from gateway.predict.gates import GateAlerts
+from gateway.predict.finals import GateAlerts
+from gateway.predict.gates import SPEEDS
 from gateway.settings import Site
 from gateway.sinks.scene import style
 from gateway.sinks.scene.entry import Always, Entry, entity, once
@@ -67,7 +68,7 @@ class BelievedScene:
         return f"\n{100.0 * weight:.0f} %" if name in self._published else f"{name} {100.0 * weight:.0f} %"
 
     def _alert(self, kind: str, off: float) -> str:
-        if kind == "too fast":
+        if kind in SPEEDS:
             return f"{kind}: {off * self._units.speeds:.0f} {self._units.speed}"
         return f"{kind}: {off * self._units.lengths:.0f} {self._units.length}"
 

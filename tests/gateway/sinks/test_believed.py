@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 from gateway.observation import WeatherArea
 from gateway.picture import Picture
 from gateway.predict import Candidates, Conflicts
-from gateway.predict.gates import GateAlerts
+from gateway.predict.finals import GateAlerts
 from gateway.settings import DEMO_SITE, Waypoint, Weather
 from gateway.sinks.arrow import ArrowSink
 from gateway.sinks.parquet import finish
