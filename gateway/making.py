@@ -88,7 +88,7 @@ class Making:
         return [replace(row, wind_mps=self.reckoners.wind_mps(row.aircraft)) for row in rows]
 
     def _scene(self) -> Scene:
-        return Scene(self.tracks, self._spans, self.options, self.predicting.headings)
+        return Scene(self.tracks, self._spans, self.options, self.predicting.headings, self.consistency.contradicted)
 
     @property
     def _spans(self) -> Spans:

@@ -10,7 +10,7 @@ from gateway import associate, fuse, predict, track
 from gateway.align import SECOND
 from gateway.associating import Associating
 from gateway.fuse import Lane
-from gateway.fuse.consistency import Finding
+from gateway.fuse.evidence import Finding
 from gateway.making import NAMED_AT_MOST
 from gateway.observation import Attitude, Heard
 from gateway.picture import Event

@@ -19,8 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix, Plot
+from gateway.fuse.displacement import Displacements
 from gateway.fuse.events import Event, Measure
-from gateway.fuse.evidence import ENOUGH, PLOT, REPORT, Part, changes_of, evidence, factors, summed
+from gateway.fuse.evidence import ENOUGH, PLOT, REPORT, Finding, Part, changes_of, evidence, factors, summed
+from gateway.fuse.mismatch import mismatches
 from gateway.fuse.scatter import Rows, left_of_plots, left_of_reports, rows_of
 from gateway.settings import PositionSource, RadarSite
 
@@ -28,6 +30,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 SURE = 12.0  # evidence that is sure of a single noise; of many, the logarithm of their number more
+SUSPECT = 4.0  # evidence against a velocity from which on what its positions scatter by is not judged
 LASTING = 0.3  # a receiver whose reports scatter by less than this share of what is stated has errors that last
 TOGETHER_AT_LEAST, TOGETHER_ENOUGH = 3, 4.0 * ENOUGH  # aircraft, and squares of theirs, which are many soon
 MANY, WAIT_NS = 64, 5 * SECOND  # measurements that are judged at once, or all that came in so long
@@ -41,15 +44,8 @@ FORGOTTEN_NS = 3600 * SECOND  # and those that were not heard for so long
 
 Key = tuple[str, str, bool]  # source, part, whether the site file sets its noise
 Share = tuple[tuple[int, Event], ...]  # measurements, each with its track
+OF = "GPS of "  # an aircraft, as a source
 ALL = "GPS"  # the source that all aircraft together are
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """A source that is inconsistent with its settings: what is said of it, and under which heading it is said once."""
-
-    topic: str
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +70,8 @@ class Consistency:
     planned: tuple[tuple[int, Share], ...] = ()  # when which measurements are judged
     reports: Rows | None = None
     plots: Rows | None = None
+    displacements: Displacements = Displacements()
+    contradicted: frozenset[str] = frozenset()  # aircraft whose velocities are surely not those of their positions
 
     def hearing(self, events: Iterable[tuple[int, Event]]) -> Consistency:
         """The same with new measurements waiting to be judged, each with its track."""
@@ -128,27 +126,54 @@ class Consistency:
 
     def again(self) -> Consistency:
         """The same where time was set back: what is known of noises stays, and no measurement is held against later ones."""
-        return Consistency(self.noises, self.sums, self.heard)
+        return Consistency(self.noises, self.sums, self.heard, contradicted=self.contradicted)
 
     def _with(
         self, share: Share, position: PositionSource, radars: Mapping[int, RadarSite], at: int
     ) -> tuple[Consistency, list[Finding]]:
         """The same with some measurements worked in, and what is sure by now of their sources."""
         by_serial = sorted(share, key=lambda one: one[1].measure.serial)
-        told, kept = list[Told](), list[Rows | None]()
+        told, kept, found, after = list[Told](), list[Rows | None](), list[Finding](), self
         for known, count, is_plot in ((self.reports, KEPT_REPORTS, False), (self.plots, KEPT_PLOTS, True)):
             new = [one for one in by_serial if isinstance(one[1].measure, Plot) == is_plot]
             if new:
                 fresh = rows_of(new)
                 mine, others = (None, None) if known is None else known.parted(fresh.group)
-                rows = fresh.merged(mine)
-                told += _told(rows, [event for _, event in new], position, radars)
+                rows, events = fresh.merged(mine), [event for _, event in new]
+                told += _told(rows, events, position, radars)
+                if not is_plot:
+                    after, found = self._displaced(rows, events, told)
                 latest = rows.latest(count, at - KEPT_NS)
                 known = latest if others is None else latest.after(others)
             kept.append(known)
-        after = replace(self, reports=kept[0], plots=kept[1])
-        after, found = after._summed(told, at) if told else (after, [])
-        return after._remembered(at), found
+        after = replace(after, reports=kept[0], plots=kept[1])
+        after, scattered = after._summed(told, at) if told else (after, [])
+        return after._remembered(at), [*found, *scattered]
+
+    def _displaced(
+        self, rows: Rows, events: Sequence[Event], told: Sequence[Told]
+    ) -> tuple[Consistency, list[Finding]]:
+        """The same with new reports' displacements, and velocities that are surely wrong.
+
+        What their positions scatter by is not known while velocities are suspected: evidence of it begins anew.
+        """
+        new = np.flatnonzero(rows.new)
+        if not len(new):
+            return self, []
+        group, place = np.unique(rows.group[new], return_index=True)
+        by_group = {
+            one: events[row].measure for one, row in zip(group.tolist(), rows.event[new[place]].tolist(), strict=True)
+        }
+        rows = rows.of(np.isin(rows.group, group))
+        names = [measure.aircraft for measure in by_group.values() if isinstance(measure, Fix)]
+        known = self.displacements.after(rows, names)
+        suspected, sure = mismatches(known, SUSPECT), SURE + math.log(2.0 * max(len(known.aircraft), 1))
+        for one in told:
+            if suspected:
+                one.evidence[[key[0].removeprefix(OF) in suspected for key in one.keys], ::3] = -math.inf
+        wrong = mismatches(known, sure) if suspected else {}
+        after = replace(self, displacements=known, contradicted=frozenset(wrong))
+        return after, [finding for findings in wrong.values() for finding in findings]
 
     def _summed(self, told: Sequence[Told], at: int) -> tuple[Consistency, list[Finding]]:
         """The same with evidence added to the sums, and what is sure by now."""
@@ -175,7 +200,9 @@ class Consistency:
         return after, list(found.values())
 
     def _remembered(self, at: int) -> Consistency:
-        """The same without noises of sources that were not heard for long, or of too many."""
+        """The same without sources that were not heard for long, or of too many."""
+        displacements = self.displacements.remembered(at - FORGOTTEN_NS, NOISES_AT_MOST)
+        self = self if displacements is self.displacements else replace(self, displacements=displacements)
         keep = self.heard >= at - FORGOTTEN_NS
         if len(keep) > NOISES_AT_MOST:
             keep &= self.heard.argsort(kind="stable").argsort() >= len(keep) - NOISES_AT_MOST
@@ -217,7 +244,7 @@ def _told(rows: Rows, events: Sequence[Event], position: PositionSource, radars:
     measures = [event.measure for event in new]
     sources: dict[str | int, int] = {}
     source = np.array([sources.setdefault(_source(measure), len(sources)) for measure in measures])
-    names = [f"radar {name}" if is_plot else f"GPS of {name}" for name in sources]
+    names = [f"radar {name}" if is_plot else f"{OF}{name}" for name in sources]
     said = np.array([_said(name, position, radars) for name in sources])[source]
     changes = changes_of(new, sigma.shape[1])
     found = []
@@ -242,7 +269,8 @@ def _together(told: Told, noises: Mapping[Key, int], sums: Floats, factor: Float
     row = noises.get((ALL, told.part.name, True))
     if row is None or is_set.sum() < TOGETHER_AT_LEAST:
         return None
-    added = told.evidence[is_set & np.isnan(factor)].sum(axis=0, keepdims=True)
+    counted = is_set & np.isnan(factor) & np.isfinite(told.evidence[:, 0])
+    added = told.evidence[counted].sum(axis=0, keepdims=True)
     sums[row] = summed(sums[row : row + 1], added)[0]
     (found,) = factors(sums[row : row + 1], sure, TOGETHER_ENOUGH).tolist()
     return _finding(told, int(is_set.argmax()), (ALL, told.part.name, True), found)

@@ -100,6 +100,7 @@ class Job:
     neighbour: Neighbour
     fresh: int = -1  # serial of the measurement that asked for it
     headings: tuple[Heading, ...] = ()  # where its aircraft says it goes
+    doubted: bool = False  # velocities of its reports are known not to be those of their positions
 
 
 def rank(measure: Measure) -> tuple[int, int, str, int]:

@@ -31,6 +31,14 @@ DISTURBED = 0.3  # of the noise's variance, by a hard manoeuvre that never ends:
 
 
 @dataclass(frozen=True, slots=True)
+class Finding:
+    """A source that is inconsistent with its settings: what is said of it, and under which heading it is said once."""
+
+    topic: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class Part:
     """Which components of a measurement share one noise, and where that is set: a key in a table of the site file."""
 

@@ -48,7 +48,9 @@ def run(jobs: Sequence[Job], model: Model) -> list[list[Event]]:
         goals = None
         if heads:
             goals = [goal_at(jobs[index].headings, measure.at) for index, measure in zip(active, measures, strict=True)]
-        for index, event in zip(active, _advance(bases, measures, neighbours, goals, estimator, model), strict=True):
+        doubted = [jobs[index].doubted for index in active]
+        advanced = _advance(bases, measures, neighbours, goals, doubted, estimator, model)
+        for index, event in zip(active, advanced, strict=True):
             events[index].append(event)
     return events
 
@@ -75,6 +77,7 @@ def _advance(
     measures: Sequence[Measure],
     neighbours: Sequence[Neighbour],
     goals: Sequence[Point] | None,
+    doubted: Sequence[bool],
     estimator: Estimator,
     model: Model,
 ) -> list[Event]:
@@ -87,18 +90,19 @@ def _advance(
             events[row] = resumed(base, measure, estimator, model)
             continue
         if base is None:
-            first, belief = estimator.begin(measure)
+            first, belief = estimator.begin(without_velocity(measure) if doubted[row] else measure)
             nothing = np.full((model.memory, 3), np.nan)
             events[row] = _event(measure, first.mean[0], first.covariance[0], nothing, belief, None)
             continue
         near = neighbours[row](measure) if literal and isinstance(measure, Fix) and measure.has_height else None
-        groups.setdefault(_group(measure, near), []).append((row, base, measure, believed(base, measure), near))
+        taken = without_velocity(measure) if doubted[row] else believed(base, measure)
+        groups.setdefault(_group(measure, near), []).append((row, base, measure, taken, near))
     for (kind, radar), members in groups.items():
-        rows, before, chosen, taken, seen = zip(*members, strict=True)
+        rows, before, chosen, given, seen = zip(*members, strict=True)
         elapsed_s = np.array([(measure.at - base.at) / SECOND for base, measure in zip(before, chosen, strict=True)])
         memory = stacked([base.memory for base in before])
         goal = None if goals is None else np.array([goals[row] for row in rows])
-        group = Group(kind, radar, taken, seen, elapsed_s, memory, goal)
+        group = Group(kind, radar, given, seen, elapsed_s, memory, goal)
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):  # what comes of it is begun anew
             after = estimator.advance(before, group)
         all_sound = is_sound(after.state)
@@ -110,7 +114,7 @@ def _advance(
         ):
             far_off, far_since = far_row(base) if far else (0, NEVER)
             score = score_after(base, measure, model)
-            event = _event(measure, *state, base, outlying, score, far_off, far_since, residual)
+            event = _event(measure, *state, base, outlying, score, far_off, far_since, residual, doubted[row])
             lost = (far_off and may_be_lost(event)) or not all_sound
             events[row] = _begun_again(event, estimator) if lost else event
     return [events[row] for row in range(len(measures))]
@@ -166,6 +170,7 @@ def _event(
     far_off: int = 0,
     far_since: int = NEVER,
     residual: tuple[Floats, Floats] | None = None,
+    doubted: bool = False,
 ) -> Event:
     gps_at, radar_at, height_at = (base.gps_at, base.radar_at, base.height_at) if base else (NEVER, NEVER, NEVER)
     barometric, callsign = (base.barometric, base.callsign) if base else (None, None)
@@ -182,7 +187,9 @@ def _event(
     interval = max(measure.at - base.at, base.interval - base.interval // 8) if base else 0
     source, latest, told = measure.radar if isinstance(measure, Plot) else 0, base.latest if base else {}, None
     restarted_at, doubts = (base.restarted_at, base.doubts) if base else (NEVER, 0)
-    if doubts:
+    if doubted:
+        doubts = DOUBTS
+    elif doubts:
         doubts = doubts_after(doubts, measure, mean, covariance)
     if residual is not None:
         told = Residual.after(latest.get(source), *residual)

@@ -34,6 +34,7 @@ class Scene:
     spans: Spans
     options: Options
     headings: Headings = Headings()
+    contradicted: frozenset[str] = frozenset()  # aircraft whose velocities are not those of their positions
 
     def neighbour(self, lane: Lane) -> Neighbour:
         """The plot of this lane's radar track at a report's time, for the literal weighting."""
@@ -154,6 +155,7 @@ def _inserted(lanes: Lanes, lane: Lane, measure: Measure, scene: Scene) -> tuple
         scene.neighbour(lane),
         measure.serial,
         scene.headings.of(lane.aircraft),
+        lane.aircraft in scene.contradicted,
     )
     return lanes if place == len(events) else lanes.with_lane(lane.with_events(events[:place])), job
 
@@ -185,7 +187,8 @@ def _rebuilt(lanes: Lanes, lane: Lane, at: int, scene: Scene) -> tuple[Lanes, Jo
     measures.sort(key=rank)
     if not measures:
         return lanes, None
-    return lanes, Job(lane.track, base, measures, scene.neighbour(lane), headings=scene.headings.of(lane.aircraft))
+    doubted, headings = lane.aircraft in scene.contradicted, scene.headings.of(lane.aircraft)
+    return lanes, Job(lane.track, base, measures, scene.neighbour(lane), headings=headings, doubted=doubted)
 
 
 def _begun_from_plots(lanes: Lanes, key: Key, ordinal: int, scene: Scene) -> tuple[Lanes, Job | None]:

@@ -138,7 +138,7 @@ def rows_of(told: Sequence[tuple[int, Event]]) -> Rows:
         value, sigma = np.array([plot.polar for plot in plots]), np.array([plot.sigma for plot in plots])
     else:
         fixes = [event.measure for event in events if isinstance(event.measure, Fix)]
-        value = np.concatenate([part for fix in fixes for part in (fix.enu_m, fix.velocity_mps)]).reshape(-1, 6)
+        value = np.concatenate([part for fix in fixes for part in (fix.enu_m, _velocity(fix))]).reshape(-1, 6)
         value[[not fix.has_height for fix in fixes], 2] = math.nan
         sigma = np.empty(value.shape)
         sigma[:, :3] = np.concatenate([fix.sigma_m for fix in fixes]).reshape(-1, 3)
@@ -147,6 +147,13 @@ def rows_of(told: Sequence[tuple[int, Event]]) -> Rows:
     velocity = np.concatenate([event.mean[VELOCITY] for event in events]).reshape(-1, 3)
     speed_mps = np.sqrt(np.square(velocity).sum(axis=1))
     return Rows(group, at, value, sigma, speed_mps, np.arange(len(told)))
+
+
+def _velocity(fix: Fix) -> Floats:
+    """East, north, up (3,) of a report, m/s; where one is missing along its own axes, turned by a degree 100 km away."""
+    if fix.local is None or not math.isnan(fix.velocity_mps[0]):
+        return fix.velocity_mps
+    return fix.local.velocity_mps
 
 
 def left_of_reports(rows: Rows) -> Left:
