@@ -27,9 +27,9 @@ ABOVE_GLIDE_PATH_M = 150.0  # from no higher than this
 CROSSES = math.tan(math.radians(20.0))  # at more than this angle it is crossed, and not flown along
 MOST_TURNED_RAD = 5.0  # between two points of a path; who turns further is drawn through the middle of its circle
 LEVELS_OFF, CLIMBS_MPS = 0.2, 0.3  # a climb may change by this share of it, and who is level may begin to climb
-# Straight flight goes on for so long in the mean, however long it has lasted; meanwhile a course is off by so much, and the
-# speed wanders, as a share of it, rad2/s of the place along. Measured on arrivals to Paris: docs/papers/000-intent.md.
-STRAIGHT_S, KEEPS_RAD, SLOWS = 240.0, 0.01, 3e-5
+# Straight flight goes on for so long in the mean, however long it has lasted; meanwhile it is so far beside its line, and
+# the square of how late it is grows so with the cube of the time. Measured on arrivals to Paris: docs/papers/000-intent.md.
+STRAIGHT_S, KEEPS_RAD, SLOWS = 300.0, 0.02, 3e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)

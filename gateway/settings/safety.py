@@ -17,7 +17,7 @@ class Separation:
     horizontal_m: float = 1220.0
     vertical_m: float = 140.0
     look_ahead_s: float = 120.0
-    least_probability: float = 0.02  # less likely ones are not told
+    least_probability: float = 0.2  # less likely ones are not told
     least_height_m: float = 30.0  # above the runway: who is lower stands, lands or has just taken off
 
 
