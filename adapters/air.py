@@ -1,6 +1,6 @@
 """What a vehicle says of the air that it flies in, as AirData. Winds there are where the air moves TO.
 
-    VFR_HUD (74)           airspeed, groundspeed, climb m/s; alt m above mean sea level; no time
+    VFR_HUD (74)           airspeed, groundspeed, climb m/s; alt m above mean sea level; heading, whole degrees; no time
     SCALED_PRESSURE (29)   press_abs, press_diff hPa; temperature centidegrees C, of the pressure sensor
     WIND (168)             ArduPilot: direction degrees, where it comes FROM; speed m/s; speed_z m/s, DOWN; no time
     WIND_COV (231)         wind_x, wind_y, wind_z m/s: where it moves to, north, east, DOWN; NaN = not known
@@ -19,7 +19,7 @@ from adapters.vehicle import Vehicle
 from adapters.vehicles import Component
 from gateway.observation import AirData
 
-VFR_HUD, _read_hud = fields("VFR_HUD", "airspeed", "groundspeed", "alt", "climb")
+VFR_HUD, _read_hud = fields("VFR_HUD", "airspeed", "groundspeed", "alt", "climb", "heading")
 SCALED_PRESSURE, _read_pressure = fields("SCALED_PRESSURE", "time_boot_ms", "press_abs", "press_diff", "temperature")
 WIND, _read_wind = fields("WIND", "direction", "speed", "speed_z")
 WIND_COV, _read_wind_components = fields("WIND_COV", "time_usec", "wind_x", "wind_y", "wind_z")
@@ -35,7 +35,7 @@ def hud(
     moments: Moments, component: Component, vehicle: Vehicle, payload: bytes, received_at: int, counters: Counter[str]
 ) -> Observations:
     """VFR_HUD."""
-    airspeed, groundspeed, altitude, climb = _read_hud(payload)
+    airspeed, groundspeed, altitude, climb, heading = _read_hud(payload)
     air = _within(airspeed, 0.0, FASTEST_MPS, counters)
     ground = _within(groundspeed, 0.0, FASTEST_MPS, counters)
     rate = _within(climb, -FASTEST_MPS, FASTEST_MPS, counters)
@@ -52,7 +52,8 @@ def hud(
     if air is None and ground is None and rate is None and high is None:
         return ()
     valid_at = moments.shown_at_receipt(component, received_at)
-    return (AirData(vehicle.name, valid_at, received_at, air, ground, rate, high),)
+    nose = math.radians(heading) if 0 <= heading <= 360 else None  # -1: its autopilot does not know
+    return (AirData(vehicle.name, valid_at, received_at, air, ground, rate, high, compass_heading_rad=nose),)
 
 
 def pressure(

@@ -25,7 +25,12 @@ def hud(rows: Rows, fields: Sequence[tuple[int, NDArray[Any]]]) -> Many:
     rows.show(_HUD_SHOWN, values)
     says = ~np.logical_and.reduce(np.isnan(values))
     names = ("airspeed_mps", "groundspeed_mps", "climb_mps", "altitude_msl_m")
-    return rows.many(AirData, says, rows.at_receipt(), **dict(zip(names, values, strict=True)))
+    columns = dict(zip(names, values, strict=True))
+    heading = told["heading"].astype(np.float64)
+    is_known = (heading >= 0.0) & (heading <= 360.0)
+    if is_known.any():
+        columns["compass_heading_rad"] = np.where(is_known, np.radians(heading), np.nan)
+    return rows.many(AirData, says, rows.at_receipt(), **columns)
 
 
 def pressure(rows: Rows, fields: Sequence[tuple[int, NDArray[Any]]]) -> Many:

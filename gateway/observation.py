@@ -142,9 +142,11 @@ class AirData:
     wind_east_mps: float | None = None
     wind_north_mps: float | None = None
     wind_up_mps: float | None = None
+    compass_heading_rad: float | None = None  # where the nose points, clockwise from true north
 
 
 AEROPLANES = frozenset((1, *range(19, 26)))  # MAV_TYPE: fixed wing, and those that take off upright
+COPTERS = frozenset((2, 3, 4, 13, 14, 15, 29, 35))
 
 
 @made_swiftly

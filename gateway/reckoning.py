@@ -92,7 +92,7 @@ class Reckoning(Fusing):
             self.events.append(Event(at, "info", f"{aircraft}: what it says of its position agrees again, and is used"))
             return
         how = "jumped" if now == JUMPED else "walks off slowly"
-        what = "its attitude and its airspeed" if self.reckoners.by_flight(aircraft) else "inertial data"
+        what = self.reckoners.by(aircraft).words
         text = f"{aircraft}: what it says of its position {how}, which {what} deny: it is not used"
         self.count("position sources denied")
         self.events.append(Event(at, "warning", text))

@@ -1,9 +1,10 @@
 """Dead reckoning: an error-state filter about strapdown navigation, that goes on while no position comes.
 
 Seventeen error states: place (3) m and velocity (3) m/s north, east, down; attitude (3) rad about the same axes; gyro bias (3)
-rad/s and accelerometer bias (3) m/s2 along the body; wind (2) m/s, where the air moves to, north and east. What a vehicle
-tells beside its inertial unit ties them: positions, velocities, the autopilot's own attitude, airspeed, height by pressure;
-and that wheels and keels do not move sideways. All over leading axes: one vehicle or a hundred.
+rad/s and accelerometer bias (3) m/s2 along the body; wind (2) m/s, where the air moves to, north and east. Of what hangs from
+rotors and has no unit there is an eighteenth, its drag (`medium`). What a vehicle tells beside its inertial unit ties them:
+positions, velocities, the autopilot's own attitude, airspeed, height by pressure; and that wheels and keels do not move
+sideways. All over leading axes: one vehicle or a hundred.
 
 Source: 002-4 2 and 3. Deviation: the printed filter estimates positions and accelerations of a plane; it is kept beside this
 one in `plane_reckoning`.
@@ -11,7 +12,7 @@ one in `plane_reckoning`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,10 +21,11 @@ from gateway.estimators.inertial import Motion, advanced, between, cross, displa
 
 Floats = NDArray[np.float64]
 
-STATES = 17
+STATES, STATES_WITH_DRAG = 17, 18
 PLACE, VELOCITY, ATTITUDE = slice(0, 3), slice(3, 6), slice(6, 9)
 GYRO, FORCE, WIND = slice(9, 12), slice(12, 15), slice(15, 17)
-_EYE = np.eye(STATES)
+DRAG = 17
+_EYE = {count: np.eye(count) for count in (STATES, STATES_WITH_DRAG)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +44,23 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Reckoning:
-    """What is known of vehicles (...): their motion, the biases (..., 3), the wind (..., 2), the covariance (..., 17, 17)."""
+    """What is known of vehicles (...): their motion, the biases (..., 3), the wind (..., 2), the covariance (..., 17, 17) or,
+    where drag is one of the states, (..., 18, 18).
+    """
 
     motion: Motion
     rate_bias_radps: Floats
     force_bias_mps2: Floats
     wind_mps: Floats
     covariance: Floats
+    drag_per_s: Floats = field(
+        default_factory=lambda: np.zeros(())
+    )  # (...,) the share of its airspeed lost in a second
+
+    @property
+    def one(self) -> Floats:
+        """The unit matrix of its states."""
+        return _EYE[self.covariance.shape[-1]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,16 +77,22 @@ def started(
     velocity_sigma_mps: ArrayLike,
     attitude_sigma_rad: ArrayLike,
     unit: Unit = Unit(),
+    drag_per_s: tuple[float, float] | None = None,
 ) -> Reckoning:
-    """The state of vehicles whose motion is known so well; sigmas (3,) or (..., 3)."""
+    """The state of vehicles whose motion is known so well; sigmas (3,) or (..., 3). `drag_per_s`: about what their drag is,
+    and its sigma, where it is one of the states.
+    """
     shape = np.shape(motion.height_m)
-    sigma = np.zeros((*shape, STATES))
+    drag, drag_sigma = drag_per_s or (0.0, 0.0)
+    count = STATES if drag_per_s is None else STATES_WITH_DRAG
+    sigma = np.zeros((*shape, count))
     sigma[..., PLACE], sigma[..., VELOCITY] = place_sigma_m, velocity_sigma_mps
     sigma[..., ATTITUDE] = attitude_sigma_rad
     sigma[..., GYRO], sigma[..., FORCE] = unit.rate_bias_radps, unit.force_bias_mps2
-    sigma[..., WIND] = unit.wind_mps
-    covariance = sigma[..., None] ** 2 * _EYE
-    return Reckoning(motion, np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros((*shape, 2)), covariance)
+    sigma[..., WIND], sigma[..., DRAG:] = unit.wind_mps, drag_sigma
+    covariance = sigma[..., None] ** 2 * _EYE[count]
+    bias, wind = np.zeros((*shape, 3)), np.zeros((*shape, 2))
+    return Reckoning(motion, bias, bias, wind, covariance, np.full(shape, drag))
 
 
 def carried_on(
@@ -121,8 +139,9 @@ def _covariance_after(
     covariance: Floats, body: Floats, felt: Floats, biased: Floats, step: Floats, unit: Unit
 ) -> Floats:
     """The covariance a while (...,) later, of the mean attitude (..., 3, 3) and the mean force felt (..., 3) in it."""
-    across = np.zeros((*step.shape, STATES, STATES))
-    across[..., :, :] = _EYE
+    count = covariance.shape[-1]
+    across = np.zeros((*step.shape, count, count))
+    across[..., :, :] = _EYE[count]
     whole, half = step[..., None, None], 0.5 * step[..., None, None]
     tilt, lean = -skew(felt) * whole, -body * whole
     across[..., PLACE, VELOCITY] = np.eye(3) * whole
@@ -150,17 +169,17 @@ def with_place(
 ) -> tuple[Reckoning, Innovation]:
     """With a position; sigmas (..., 3) north, east, down."""
     latitude, longitude, height = (np.asarray(one, dtype=np.float64) for one in (latitude_rad, longitude_rad, height_m))
-    return _with(state, between(latitude, longitude, height, state.motion), _EYE[PLACE], sigma_m)
+    return _with(state, between(latitude, longitude, height, state.motion), state.one[PLACE], sigma_m)
 
 
 def with_velocity(state: Reckoning, velocity_mps: ArrayLike, sigma_mps: ArrayLike) -> tuple[Reckoning, Innovation]:
     """With a velocity over the ground (..., 3) north, east, down; nought for what stands still."""
-    return _with(state, np.asarray(velocity_mps) - state.motion.velocity_mps, _EYE[VELOCITY], sigma_mps)
+    return _with(state, np.asarray(velocity_mps) - state.motion.velocity_mps, state.one[VELOCITY], sigma_mps)
 
 
 def with_measured(state: Reckoning, off: ArrayLike, sigma: ArrayLike) -> Reckoning:
     """With place and velocity that are off by so much (..., 6) m and m/s, north, east, down; sigmas (..., 6)."""
-    return _with(state, np.asarray(off, dtype=np.float64), _EYE[:6], sigma)[0]
+    return _with(state, np.asarray(off, dtype=np.float64), state.one[:6], sigma)[0]
 
 
 def with_attitude(state: Reckoning, attitude: Floats, sigma_rad: ArrayLike) -> tuple[Reckoning, Innovation]:
@@ -171,12 +190,12 @@ def with_attitude(state: Reckoning, attitude: Floats, sigma_rad: ArrayLike) -> t
     conjugate = state.motion.attitude * [1.0, -1.0, -1.0, -1.0]
     apart = product(attitude, conjugate)
     apart = apart * np.where(apart[..., :1] < 0.0, -1.0, 1.0)
-    return _with(state, 2.0 * apart[..., 1:], _EYE[ATTITUDE], sigma_rad)
+    return _with(state, 2.0 * apart[..., 1:], state.one[ATTITUDE], sigma_rad)
 
 
 def with_gyro_bias(state: Reckoning, bias_radps: ArrayLike, sigma_radps: ArrayLike) -> tuple[Reckoning, Innovation]:
     """With what the gyro's bias is seen to be (..., 3), by another that tells how it turned; sigmas (..., 3)."""
-    return _with(state, np.asarray(bias_radps) - state.rate_bias_radps, _EYE[GYRO], sigma_radps)
+    return _with(state, np.asarray(bias_radps) - state.rate_bias_radps, state.one[GYRO], sigma_radps)
 
 
 def with_airspeed(
@@ -188,7 +207,7 @@ def with_airspeed(
     body = matrix(state.motion.attitude)
     along = (np.swapaxes(body, -1, -2) @ through[..., None])[..., 0]
     speed = np.maximum(np.linalg.norm(through, axis=-1), 1.0)
-    observed = np.zeros((*speed.shape, 2, STATES))
+    observed = np.zeros((*speed.shape, 2, len(state.one)))
     forward = through / speed[..., None]
     observed[..., 0, VELOCITY], observed[..., 0, WIND] = forward, -forward[..., :2]
     right = body[..., :, 1]
@@ -202,7 +221,7 @@ def with_wheels(state: Reckoning, sigma_mps: ArrayLike) -> tuple[Reckoning, Inno
     """With no velocity to the side and none through the floor, sigmas (..., 2): ground vehicles and, to the side, ships."""
     body = matrix(state.motion.attitude)
     sides = np.swapaxes(body[..., :, 1:], -1, -2)
-    observed = np.zeros((*np.shape(state.motion.height_m), 2, STATES))
+    observed = np.zeros((*np.shape(state.motion.height_m), 2, len(state.one)))
     observed[..., VELOCITY] = sides
     observed[..., ATTITUDE] = cross(sides, state.motion.velocity_mps[..., None, :])
     return _with(state, -(sides @ state.motion.velocity_mps[..., None])[..., 0], observed, sigma_mps)
@@ -216,7 +235,7 @@ def _with(state: Reckoning, off: Floats, observed: Floats, sigma: ArrayLike) -> 
     innovation = observed @ before
     innovation = 0.5 * (innovation + np.swapaxes(innovation, -1, -2)) + noise[..., None] * np.eye(off.shape[-1])
     gain = np.swapaxes(np.linalg.solve(innovation, np.swapaxes(before, -1, -2)), -1, -2)
-    kept = _EYE - gain @ observed
+    kept = state.one - gain @ observed
     covariance = kept @ state.covariance @ np.swapaxes(kept, -1, -2) + (gain * noise[..., None, :]) @ np.swapaxes(
         gain, -1, -2
     )
@@ -234,6 +253,7 @@ def _corrected(state: Reckoning, error: Floats, covariance: Floats) -> Reckoning
         state.force_bias_mps2 + error[..., FORCE],
         state.wind_mps + error[..., WIND],
         covariance,
+        state.drag_per_s + (error[..., DRAG] if error.shape[-1] > DRAG else 0.0),
     )
 
 

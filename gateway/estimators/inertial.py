@@ -164,3 +164,9 @@ def from_angles(roll_rad: ArrayLike, pitch_rad: ArrayLike, yaw_rad: ArrayLike) -
         cr * cp * sy - sr * sp * cy,
     )
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
+
+
+def heading_rad(attitude: Floats) -> Floats:
+    """Where the nose points (...,), clockwise from north, of quaternions (..., 4)."""
+    w, x, y, z = np.moveaxis(attitude, -1, 0)
+    return np.asarray(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))

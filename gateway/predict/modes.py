@@ -7,10 +7,9 @@ PX4             main mode 4 (auto), sub mode 5 is return; whose mission is done 
 
 from __future__ import annotations
 
-from gateway.observation import AEROPLANES, VehicleStatus
+from gateway.observation import AEROPLANES, COPTERS, VehicleStatus
 
 ARDUPILOT, PX4 = 3, 12
-COPTERS = frozenset((2, 3, 4, 13, 14, 15, 29, 35))
 ARDUPILOT_RTL, COPTER_RTL = 11, 6
 PX4_RETURN = 5 << 24 | 4 << 16
 

@@ -1,9 +1,10 @@
 """Dead reckoning live: what vehicles tell of their own motion carries them on while their positions are away, or are denied.
 
-`told` holds what was told in columns, `flying` what a unit would have told of vehicles that have none, `cells` cuts it into
-tenths of a second, `running` runs the filters of many vehicles side by side, `ties` what these are tied to, `judging` says
-which positions are to be believed, `freezing` whether a place only stays the same, `vehicle` remembers one vehicle, `reckoned`
-is where it is, `reckoners` is all of that as one immutable value. Source: 002-4.
+`told` holds what was told in columns, `kinds` what vehicles are and are carried on by, `flying` what a unit would have told of
+those that have none, `cells` cuts it into tenths of a second, `running` runs the filters of many vehicles side by side, `ties`
+what these are tied to, `standing` whether they stand, `judging` says which positions are to be believed, `proving` whose filters
+have shown that they may, `freezing` whether a place only stays the same, `vehicle` remembers one vehicle, `reckoned` is where it
+is, `reckoners` is all of that as one immutable value. Source: 002-4.
 """
 
 from gateway.reckon.freezing import LastPlace

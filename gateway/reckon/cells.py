@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators.inertial import product, turned_by
-from gateway.reckon.told import AIRSPEED, ALTITUDE, ATTITUDE, PLACE, Series, Told
+from gateway.reckon.told import AIRSPEED, ALTITUDE, ATTITUDE, PLACE, RESTING, Series, Told
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -25,6 +25,7 @@ CELL_S = CELL_NS / 1e9
 SECOND_CELLS = 10
 BLOCK = 5  # cells that the filters go through at once: what is told in one counts at its end
 PAST_CELLS = 20
+RESTS_NS = 3 * SECOND  # so long counts what a vehicle says of its rest
 GAP_NS = 500_000_000  # between two samples of the unit: beyond it nobody knows how it moved
 
 
@@ -40,6 +41,7 @@ class Cells:
     attitude: Floats  # (n, 4)
     airspeed_mps: Floats  # (n,) indicated
     altitude_m: Floats  # (n,)
+    rest: Floats  # (n,) see `told.RESTING`
     place: Floats  # (n, 9), see `told.PLACE`: of each half second the first position
     place_late_s: Floats  # (n,)
     pictured: Floats  # (n, 9)
@@ -91,6 +93,7 @@ def cells(told: Told, first: int, end: int) -> Cells:
         attitude,
         airspeed,
         altitude,
+        _held(told.series[RESTING], first, n),
         place,
         place_late,
         pictured,
@@ -154,6 +157,17 @@ def _last(series: Series, first: int, n: int) -> tuple[Floats, Floats]:
     return values, late
 
 
+def _held(series: Series, first: int, n: int) -> Floats:
+    """What was told last by the ends of cells (n,), and not long ago; NaN = nothing."""
+    ends = (np.arange(first, first + n) + 1) * CELL_NS
+    last = np.searchsorted(series.at, ends) - 1
+    known = last >= 0
+    known[known] = ends[known] - series.at[last[known]] <= RESTS_NS
+    values = np.full(n, np.nan)
+    values[known] = series.values[last[known], 0]
+    return values
+
+
 def _first_of_blocks(series: Series, first: int, n: int) -> tuple[Floats, Floats]:
     """The first values of each block, in their cells (n, k), and how long before the cell's end, s; NaN = none."""
     values, late = np.full((n, PLACE), np.nan), np.full(n, np.nan)
@@ -179,6 +193,7 @@ class Block:
     attitude: Floats
     airspeed: Floats
     altitude: Floats
+    rest: Floats
     place: Floats
     place_late: Floats
     pictured: Floats
@@ -202,6 +217,7 @@ class Block:
             column("attitude")[:, -1],
             _told_last(column("airspeed_mps")),
             _told_last(column("altitude_m")),
+            column("rest")[:, -1],
             place,
             late,
             pictured,

@@ -16,11 +16,11 @@ import numpy as np
 from gateway.observation import Observation
 from gateway.reckon.cells import CELL_NS, SECOND, Cells, cells, covered_until
 from gateway.reckon.freezing import LastPlace
+from gateway.reckon.kinds import By, Kinds
 from gateway.reckon.reckoned import Floats, Reckoned, reckoned, wind_mps
 from gateway.reckon.running import run
-from gateway.reckon.ties import WINGS, Kinds
 from gateway.reckon.tip import NOTHING
-from gateway.reckon.told import AIRSPEED, INERTIAL, PLACE, Series, Told, before, by_share, portioned, tells_motion
+from gateway.reckon.told import INERTIAL, PLACE, Series, Told, before, by_share, carrying, portioned, tells_motion
 from gateway.reckon.vehicle import Reckoner, begun_or_kept, moving, pruned, untouched, with_portion
 from gateway.settings import DeadReckoning
 
@@ -119,10 +119,10 @@ class Reckoners:
         reckoner = self.by_aircraft.get(aircraft)
         return NOTHING if reckoner is None or reckoner.tip is None else int(reckoner.tip.denied[0])
 
-    def by_flight(self, aircraft: str) -> bool:
-        """Whether no unit tells how a vehicle moves, but its attitude and its airspeed do."""
+    def by(self, aircraft: str) -> By:
+        """What carries a vehicle on."""
         reckoner = self.by_aircraft.get(aircraft)
-        return reckoner is not None and reckoner.by_flight
+        return By.UNIT if reckoner is None else reckoner.by
 
     def suspecting(self, aircraft: str) -> Reckoners:
         """The same where a vehicle's position was refused as it came: that one is among the first to go on."""
@@ -138,8 +138,7 @@ class Reckoners:
             told += now
             if rest:
                 later.append((added, tuple(rest)))
-        winged = {name for name, one in self.types.items() if one in WINGS}
-        new = sorted(tells_motion(told, winged) - {*self.by_aircraft})
+        new = sorted(tells_motion(told, self.types) - {*self.by_aircraft})
         room = max(VEHICLES_AT_MOST - len(self.by_aircraft), 0)
         known = {**self.by_aircraft, **{name: Reckoner() for name in new[:room]}}
         parts = _parts(tuple(known), self.suspects, at)
@@ -168,14 +167,13 @@ class Reckoners:
         running: list[tuple[str, Reckoner, Cells]] = []
         for aircraft in share.names:
             was, part = self.by_aircraft[aircraft], portion.get(aircraft, {})
-            is_new = INERTIAL in part and not was.by_flight and not len(was.told.series[INERTIAL].at)
+            is_new = INERTIAL in part and was.by == By.UNIT and not len(was.told.series[INERTIAL].at)
             was = Reckoner() if is_new else was  # a unit's vehicle is one from its first sample on
             told, since = with_portion(was, part)
             if aircraft in by_place and not is_new:
                 more = by_place[aircraft]
                 told, since = replace(told, places=told.places.with_more(more)), min(since, int(more.at[0]))
-            has_wings = self.types.get(aircraft) in WINGS
-            reckoner, moves = moving(replace(was, told=told), has_wings)
+            reckoner, moves = moving(replace(was, told=told), self.types.get(aircraft))
             reckoner = begun_or_kept(reckoner, moves, since, share.at, settings)
             changed[aircraft] = reckoner
             end = 0 if reckoner.tip is None else covered_until(moves, int(reckoner.tip.cell[0]))
@@ -189,15 +187,13 @@ class Reckoners:
 
     def _tells_nothing(self, aircraft: str, told: Told) -> bool:
         """Whether a vehicle is not heard any more of how it moves."""
-        tells = (INERTIAL, AIRSPEED) if self.types.get(aircraft) in WINGS else (INERTIAL,)
-        return not any(len(told.series[kind].at) for kind in tells)
+        return not any(len(told.series[kind].at) for kind in carrying(self.types.get(aircraft)))
 
     def _run(self, running: Sequence[tuple[str, Reckoner, Cells]], settings: DeadReckoning) -> dict[str, Reckoner]:
         if not running:
             return {}
-        kinds = Kinds.of(
-            [self.types.get(aircraft) for aircraft, _, _ in running], [not one.by_flight for _, one, _ in running]
-        )
+        types = [self.types.get(aircraft) for aircraft, _, _ in running]
+        kinds = Kinds.of(types, [one.by for _, one, _ in running])
         tips = [one.tips[-1] for _, one, _ in running]
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):  # what is no number any more is let go of
             left = run(tips, [inputs for _, _, inputs in running], kinds, settings)

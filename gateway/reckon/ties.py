@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,49 +13,19 @@ from numpy.typing import NDArray
 from gateway.estimators import dead_reckoning as dr
 from gateway.estimators.dead_reckoning import Reckoning
 from gateway.estimators.inertial import between, displaced
-from gateway.observation import AEROPLANES
 from gateway.reckon.cells import BLOCK, CELL_S, SECOND_CELLS, Block
 from gateway.reckon.judging import FAR
+from gateway.reckon.kinds import Kinds
 from gateway.reckon.tip import NOTHING, Tip, with_each
 from gateway.reckon.told import true_airspeed_mps
 from gateway.settings import DeadReckoning
 
 Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 LASTS_S = 30.0  # the errors of an autopilot's attitude, of an airspeed and of an altitude: what is told is that old
 ATTITUDE_EVERY = 10  # cells
 SLOWEST_AIR_MPS = 8.0  # below it an airspeed tells nothing
 _LOOSE_M = 1e6
-
-
-@dataclass(frozen=True, slots=True)
-class Kinds:
-    """What n vehicles are (n,): with wheels, with a keel, with wings; and whether an inertial unit tells of them."""
-
-    wheels: Bools
-    hull: Bools
-    wings: Bools
-    unit: Bools
-
-    @classmethod
-    def of(cls, types: Sequence[int | None], units: Sequence[bool] | None = None) -> Kinds:
-        """By MAV_TYPE; `units`: of which an inertial unit tells, None: of all."""
-        return cls(
-            np.array([one in _WHEELS for one in types], np.bool_),
-            np.array([one in _HULLS for one in types], np.bool_),
-            np.array([one in WINGS for one in types], np.bool_),
-            np.array([True] * len(types) if units is None else units, np.bool_),
-        )
-
-    def taken(self, rows: Ints) -> Kinds:
-        """Some of the vehicles."""
-        return Kinds(self.wheels[rows], self.hull[rows], self.wings[rows], self.unit[rows])
-
-
-_WHEELS = frozenset((10,))  # ground rover
-_HULLS = frozenset((11,))  # surface boat
-WINGS = AEROPLANES | {28}  # a parafoil flies as they do
 
 
 def tied(state: Reckoning, told: Block, kinds: Kinds, cell: int, settings: DeadReckoning) -> Reckoning:
@@ -66,10 +36,10 @@ def tied(state: Reckoning, told: Block, kinds: Kinds, cell: int, settings: DeadR
         lasting = math.sqrt(2.0 * LASTS_S / (ATTITUDE_EVERY * CELL_S))
         sigma = settings.attitude_sigma_rad * np.array([1.0, 1.0, 2.0]) * lasting
         state = of_some(state, rows, lambda some: dr.with_attitude(some, told.attitude[rows][:, None], sigma)[0])
-    rows = np.flatnonzero(kinds.wheels)
+    rows = np.flatnonzero(kinds.wheels & kinds.unit)
     slip = settings.slip_mps
     state = of_some(state, rows, lambda some: dr.with_wheels(some, np.array([slip, slip]))[0])
-    rows = np.flatnonzero(kinds.hull)
+    rows = np.flatnonzero(kinds.hull & kinds.unit)
     state = of_some(state, rows, lambda some: dr.with_wheels(some, np.array([5.0 * slip, 5.0 * slip]))[0])
     rows = np.flatnonzero(kinds.wings & (told.airspeed > SLOWEST_AIR_MPS))
     if len(rows):

@@ -8,19 +8,28 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.observation import AirData, Attitude, ImuSample, Many, Observation
+from gateway.observation import AirData, Attitude, ImuSample, Many, Observation, VehicleStatus
+from gateway.reckon.kinds import HULLS, ROTORS, WHEELS, WINGS, By
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-INERTIAL, ATTITUDE, AIRSPEED, ALTITUDE = range(4)
-WIDTHS = (7, 4, 1, 1)  # force, rate, sensor; quaternion; indicated airspeed; altitude above mean sea level
+INERTIAL, ATTITUDE, AIRSPEED, ALTITUDE, HEADING, RESTING = range(6)
+WIDTHS = (
+    7,
+    4,
+    1,
+    1,
+    1,
+    1,
+)  # force, rate, sensor; quaternion; indicated airspeed; altitude above mean sea level; heading; rest
+MOVES, ON_GROUND, DISARMED = 0.0, 1.0, 2.0  # what a vehicle says of its rest
 PLACE = 9  # latitude, longitude, height; velocity north, east, down; sigmas level, upright, of the velocity
 
 
@@ -70,6 +79,7 @@ class Told:
     places: Series = Series.empty(PLACE)
     pictured: Series = Series.empty(PLACE)  # where the radar had it
     noise: Floats | None = None  # (6,) of force and rate in a root Hz, where no unit told these; None: one did
+    by: By = By.UNIT
 
     def with_more(self, told: Mapping[int, Series]) -> Told:
         """The same with what came since."""
@@ -97,8 +107,9 @@ def reads(observation: Observation) -> bool:
     if isinstance(observation, Many):
         return observation.kind is ImuSample or "airspeed_mps" in observation.columns
     if isinstance(observation, AirData):
-        return observation.airspeed_mps is not None or observation.altitude_msl_m is not None
-    return isinstance(observation, ImuSample | Attitude)
+        told = observation.airspeed_mps, observation.altitude_msl_m, observation.compass_heading_rad
+        return any(one is not None for one in told)
+    return isinstance(observation, ImuSample | Attitude | VehicleStatus)
 
 
 def before(observations: Iterable[Observation], until: int) -> tuple[list[Observation], list[Observation]]:
@@ -117,26 +128,37 @@ def before(observations: Iterable[Observation], until: int) -> tuple[list[Observ
     return earlier, later
 
 
-def tells_motion(observations: Iterable[Observation], winged: Container[str]) -> set[str]:
-    """Who tells of an inertial unit; and who, with wings, of the airspeed."""
+def carrying(vehicle_type: int | None) -> tuple[int, ...]:
+    """What carries vehicles of a type on, any of these."""
+    return (INERTIAL, *(kind for kind, types in _CARRIES.items() if vehicle_type in types))
+
+
+_CARRIES = {AIRSPEED: WINGS, ATTITUDE: ROTORS | WHEELS | HULLS, HEADING: WHEELS | HULLS}
+_COLUMNS = {AIRSPEED: "airspeed_mps", ALTITUDE: "altitude_msl_m", HEADING: "compass_heading_rad"}
+
+
+def tells_motion(observations: Iterable[Observation], types: Mapping[str, int]) -> set[str]:
+    """Who tells what vehicles like it can be carried on by; `types`: their MAV_TYPE."""
     names = set[str]()
     for one in observations:
         if isinstance(one, Many):
-            if one.kind is ImuSample and one.columns.keys() >= _UNIT:
-                names.update(one.columns["aircraft"].tolist())
-            elif "airspeed_mps" in one.columns:
-                known = ~np.isnan(one.columns["airspeed_mps"])
-                names.update(name for name in one.columns["aircraft"][known].tolist() if name in winged)
-        elif isinstance(one, ImuSample):
-            if one.acceleration_mps2 is not None and one.angular_rate_radps is not None:
+            if one.kind is ImuSample:
+                if one.columns.keys() >= _UNIT:
+                    names.update(one.columns["aircraft"].tolist())
+                continue
+            for kind in (AIRSPEED, HEADING):
+                if (values := one.columns.get(_COLUMNS[kind])) is not None:
+                    told = one.columns["aircraft"][~np.isnan(values)].tolist()
+                    names.update(name for name in told if types.get(name) in _CARRIES[kind])
+        elif isinstance(one, ImuSample | Attitude | AirData):
+            said = (kind for kind, _ in _of_one(one))
+            if any(kind == INERTIAL or types.get(one.aircraft) in _CARRIES.get(kind, ()) for kind in said):
                 names.add(one.aircraft)
-        elif isinstance(one, AirData) and one.airspeed_mps is not None and one.aircraft in winged:
-            names.add(one.aircraft)
     return names
 
 
 _UNIT = {"acceleration_mps2", "angular_rate_radps"}
-_READ = _UNIT | {"aircraft", "valid_at", "sensor", "airspeed_mps", "altitude_msl_m"}
+_READ = _UNIT | {"aircraft", "valid_at", "sensor", *_COLUMNS.values()}
 
 
 def by_share(observations: Iterable[Observation], shares: Mapping[str, int]) -> dict[int, list[Observation]]:
@@ -148,7 +170,7 @@ def by_share(observations: Iterable[Observation], shares: Mapping[str, int]) -> 
             several = set(numbers)
             for share in several - {-1}:
                 found[share].append(one if len(several) == 1 else _rows(one, np.array(numbers) == share))
-        elif isinstance(one, ImuSample | Attitude | AirData) and one.aircraft in shares:
+        elif isinstance(one, ImuSample | Attitude | AirData | VehicleStatus) and one.aircraft in shares:
             found[shares[one.aircraft]].append(one)
     return found
 
@@ -165,7 +187,7 @@ def portioned(observations: Iterable[Observation]) -> Portion:
     for one in observations:
         if isinstance(one, Many):
             manys[one.kind, frozenset(one.columns)].append(one)
-        elif isinstance(one, ImuSample | Attitude | AirData):
+        elif isinstance(one, ImuSample | Attitude | AirData | VehicleStatus):
             for kind, values in _of_one(one):
                 rows[one.aircraft, kind].append((one.valid_at, values))
     for (of, names), several in manys.items():
@@ -183,14 +205,17 @@ def portioned(observations: Iterable[Observation]) -> Portion:
     return portion
 
 
-def _of_one(one: ImuSample | Attitude | AirData) -> Sequence[tuple[int, tuple[float, ...]]]:
+def _of_one(one: ImuSample | Attitude | AirData | VehicleStatus) -> Sequence[tuple[int, tuple[float, ...]]]:
     if isinstance(one, ImuSample):
         if one.acceleration_mps2 is None or one.angular_rate_radps is None:
             return ()
         return ((INERTIAL, (*one.acceleration_mps2, *one.angular_rate_radps, float(one.sensor))),)
     if isinstance(one, Attitude):
         return ((ATTITUDE, _quaternion(one)),)
-    told = ((AIRSPEED, one.airspeed_mps), (ALTITUDE, one.altitude_msl_m))
+    if isinstance(one, VehicleStatus):
+        rests = DISARMED if not one.armed else ON_GROUND if one.landed == "on ground" else MOVES
+        return ((RESTING, (rests,)),)
+    told = ((AIRSPEED, one.airspeed_mps), (ALTITUDE, one.altitude_msl_m), (HEADING, one.compass_heading_rad))
     return tuple((kind, (value,)) for kind, value in told if value is not None)
 
 
@@ -217,8 +242,7 @@ def _of_many(many: Many) -> Iterable[tuple[tuple[str, int], Series]]:
             sensor = columns["sensor"].astype(np.float64)[:, None]
             wanted.append((INERTIAL, np.hstack([columns["acceleration_mps2"], columns["angular_rate_radps"], sensor])))
     else:
-        named = ((AIRSPEED, "airspeed_mps"), (ALTITUDE, "altitude_msl_m"))
-        wanted += [(kind, columns[name][:, None]) for kind, name in named if name in columns]
+        wanted += [(kind, columns[name][:, None]) for kind, name in _COLUMNS.items() if name in columns]
     if not wanted or not len(many):
         return
     by_aircraft: defaultdict[str, list[int]] = defaultdict(list)

@@ -11,14 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gateway.reckon.cells import BLOCK, CELL_NS, SECOND, SECOND_CELLS, covered_until, first_covered
-from gateway.reckon.flying import lacks_unit, with_flight
+from gateway.reckon.flying import carried_by, with_unit
+from gateway.reckon.kinds import By
 from gateway.reckon.running import begun
 from gateway.reckon.tip import Tip
-from gateway.reckon.told import ATTITUDE, INERTIAL, Series, Told
+from gateway.reckon.told import ATTITUDE, HEADING, INERTIAL, Series, Told
 from gateway.settings import DeadReckoning
 
 NEAR_ATTITUDE_NS = 500_000_000
-MARGIN_NS = 2 * SECOND  # what is told is kept so much longer than tips
+MARGIN_NS = 4 * SECOND  # what is told is kept so much longer than tips
 SILENT_NS = 3 * SECOND  # an inertial unit that says nothing for so long: nobody knows how the vehicle moves
 
 
@@ -28,7 +29,7 @@ class Reckoner:
 
     told: Told = Told()
     tips: tuple[Tip, ...] = ()
-    by_flight: bool = False  # no unit tells how it moves: its attitude and its airspeed do
+    by: By = By.UNIT
 
     @property
     def tip(self) -> Tip | None:
@@ -39,7 +40,7 @@ class Reckoner:
 def with_portion(one: Reckoner, portion: Mapping[int, Series]) -> tuple[Told, int]:
     """What was told with what came since, and from when on that changes anything."""
     told, since = one.told.with_more(portion), 1 << 62
-    lines = (INERTIAL, ATTITUDE) if one.by_flight else (INERTIAL,)
+    lines = (INERTIAL,) if one.by == By.UNIT else (INERTIAL, ATTITUDE, HEADING)
     for kind, series in portion.items():
         first = int(series.at[0])
         if kind in lines:  # the line to it begins at the sample before
@@ -54,12 +55,12 @@ def untouched(tips: tuple[Tip, ...], since: int) -> tuple[Tip, ...]:
     return tips[:1] + tuple(tip for tip in tips[1:] if int(tip.cell[0]) * CELL_NS <= since)
 
 
-def moving(one: Reckoner, has_wings: bool) -> tuple[Reckoner, Told]:
-    """A vehicle, by its flight where it has wings and no unit tells of it; and what it told, that of such a unit included."""
-    by_flight = has_wings and lacks_unit(one.told)
-    if by_flight != one.by_flight:
-        one = replace(one, tips=(), by_flight=by_flight)
-    return one, with_flight(one.told) if by_flight else one.told
+def moving(one: Reckoner, vehicle_type: int | None) -> tuple[Reckoner, Told]:
+    """A vehicle, by what carries it on; and what it told, what a unit would have told included where it has none."""
+    by = carried_by(one.told, vehicle_type)
+    if by != one.by:
+        one = replace(one, tips=(), by=by)
+    return one, with_unit(one.told, by)
 
 
 def begun_or_kept(one: Reckoner, told: Told, since: int, at: int, settings: DeadReckoning) -> Reckoner:
@@ -87,7 +88,7 @@ def first_tip(told: Told, settings: DeadReckoning) -> Tip | None:
     for row in usable[::-1].tolist():
         nearest = int(np.argmin(np.abs(attitudes.at - places.at[row])))
         if abs(int(attitudes.at[nearest] - places.at[row])) <= NEAR_ATTITUDE_NS:
-            return begun(int(places.at[row]), places.values[row], attitudes.values[nearest], settings)
+            return begun(int(places.at[row]), places.values[row], attitudes.values[nearest], settings, told.by)
     return None
 
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from gateway.estimators.inertial import between, displaced
 from gateway.reckon.cells import CELL_NS, cells, covered_until
 from gateway.reckon.judging import WANDERS_M
+from gateway.reckon.kinds import Kinds
 from gateway.reckon.running import begun, run
-from gateway.reckon.ties import Kinds
 from gateway.reckon.tip import NOTHING, Tip
 from gateway.reckon.told import PLACE, WIDTHS, Series, Told
 from gateway.settings import DeadReckoning
@@ -124,7 +124,8 @@ def told_of(one: Teller) -> Told:
     air = Series.empty(WIDTHS[2])
     if one.airspeed_mps is not None:
         air = Series(at, one.airspeed_mps[rows][:, None])
-    series = (Series(middle, unit), Series(at, one.attitude[rows]), air, Series.empty(WIDTHS[3]))
+    rest = (Series.empty(width) for width in WIDTHS[3:])
+    series = (Series(middle, unit), Series(at, one.attitude[rows]), air, *rest)
     return replace(Told(series), places=Series(at[known], position[known]))
 
 

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from gateway.estimators.inertial import Motion, between, displaced, from_angles
 from gateway.reckon.cells import CELL_NS, SECOND_CELLS, cells, covered_until
-from gateway.reckon.flying import with_flight
+from gateway.reckon.flying import with_unit
 from gateway.reckon.judging import WANDERS_M
+from gateway.reckon.kinds import By, Kinds
 from gateway.reckon.running import run
-from gateway.reckon.ties import Kinds
 from gateway.reckon.tip import Tip
-from gateway.reckon.told import PLACE, Series, Told
+from gateway.reckon.told import PLACE, WIDTHS, Series, Told
 from gateway.reckon.vehicle import first_tip
 from gateway.settings import DeadReckoning
 
@@ -76,13 +76,13 @@ def flight(path: Path, *, attitude: bool = True, unit: bool = True) -> Told:
         Series(at[1:], samples[1:]),
         Series(at[known], lying[known]),
         Series(at, told.ias[:, None]),
-        Series.empty(1),
+        *(Series.empty(width) for width in WIDTHS[3:]),
     )
     told = Told(series, Series(at[fresh], np.hstack([place, velocity, sigmas])[fresh]))
     if unit:
         return told
     seldom = tuple(Series(one.at[::RADIO_EVERY], one.values[::RADIO_EVERY]) for one in series)
-    return with_flight(replace(told, series=seldom))
+    return with_unit(replace(told, series=seldom), By.AIRSPEED)
 
 
 def windows(told: Told, length_s: float, every_s: float = 10.0) -> Windows:
@@ -92,8 +92,7 @@ def windows(told: Told, length_s: float, every_s: float = 10.0) -> Windows:
     begin = first_tip(replace(told, places=Series(places.at[:early], places.values[:early])), SETTINGS)
     assert begin is not None
     first = int(begin.cell[0])
-    has_unit = told.noise is None
-    kinds = Kinds.of([1], [has_unit])
+    kinds = Kinds.of([1], [told.by])
     (passed,) = run([begin], [cells(told, first, covered_until(told, first))], kinds, SETTINGS)
     starts = [
         tip
@@ -104,9 +103,8 @@ def windows(told: Told, length_s: float, every_s: float = 10.0) -> Windows:
     ]
     alone = replace(told, places=Series.empty(PLACE))
     inputs = [cells(alone, int(tip.cell[0]), int(tip.cell[0]) + round(length_s * SECOND_CELLS)) for tip in starts]
-    ways = run(starts, inputs, Kinds.of([1] * len(starts), [has_unit] * len(starts)), SETTINGS)
-    scored = [[_scored(one, tip, places) for one in way] for tip, way in zip(starts, ways, strict=True)]
-    table = np.array(scored)
+    ways = run(starts, inputs, Kinds.of([1] * len(starts), [told.by] * len(starts)), SETTINGS)
+    table = np.array([[scored(one, tip, places) for one in way] for tip, way in zip(starts, ways, strict=True)])
     return Windows(length_s, table[..., 0], table[..., 1], table[..., 2])
 
 
@@ -114,7 +112,7 @@ def _second(tip: Tip) -> float:
     return (int(tip.cell[0]) * CELL_NS - START) / 1e9
 
 
-def _scored(one: Tip, begin: Tip, places: Series) -> tuple[float, float, float]:
+def scored(one: Tip, begin: Tip, places: Series) -> tuple[float, float, float]:
     """Distances to where GPS was, of dead reckoning and of constant velocity, and whether the first is within three sigma."""
     at = int(one.cell[0]) * CELL_NS
     true = np.array([np.interp(at, places.at, places.values[:, column]) for column in range(3)])

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from gateway.frames import RadarFrame, RunwayFrame, polar_from_xyz
-from gateway.observation import Heard, ImuSample, Many, RadarPlot
+from gateway.observation import Attitude, Heard, ImuSample, Many, RadarPlot
 from gateway.picture import Picture
 from gateway.settings import DeadReckoning, RadarSite
 from sim.told_pictures import (
@@ -193,9 +193,12 @@ def test_what_is_told_late_goes_back_to_its_place() -> None:
     assert a.velocity_mps == pytest.approx(b.velocity_mps, abs=1e-9)
 
 
-def test_a_car_without_an_inertial_unit_is_nothing_to_dead_reckoning() -> None:
+def test_a_car_that_tells_positions_only_is_nothing_to_dead_reckoning() -> None:
     _, said = told("car", goes_away)
-    plain = [replace(one, observations=tuple(o for o in one.observations if not isinstance(o, Many))) for one in said]
+    plain = [
+        replace(one, observations=tuple(o for o in one.observations if not isinstance(o, Many | Attitude)))
+        for one in said
+    ]
     *_, (state, _) = pictures(plain[:200])
     assert not state.reckoners.by_aircraft
     assert sum(len(some) for _, some in state.reckoners.waiting) < 40
