@@ -2,7 +2,8 @@
 
 Sensors are simulated with one noise 1.5 times as large or as small as the settings state, and the gateway's own filter and
 test (`gateway.fuse.consistency`) hear them second by second, as in a session: 003's approach, one aircraft and one radar,
-and scene `traffic`, twelve aircraft, whose reports are judged together.
+and scene `traffic`, twelve aircraft, whose reports are judged together. A second table has velocities that are not those of
+their positions: of another unit, sign or axis, or none.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ from numpy.typing import NDArray
 from gateway.align import SECOND, Fix, Plot
 from gateway.frames import RadarFrame, RunwayFrame
 from gateway.fuse.consistency import Consistency
+from gateway.fuse.displacement import EVIDENCE
 from gateway.fuse.events import Event, Job, Measure
-from gateway.fuse.evidence import PLOT, REPORT
+from gateway.fuse.evidence import REPORT
 from gateway.fuse.filtering import run as filtered
 from gateway.fuse.weighting import Model
 from gateway.settings import EstimatorName, Options, PositionSource, RadarSite
@@ -46,6 +48,21 @@ SIMULATED = {
     "azimuth": "radar.azimuth_sigma_rad",
     "elevation": "radar.elevation_sigma_rad",
 }
+# What velocities are multiplied by, by what is wrong with them.
+VELOCITIES: dict[str, Floats] = {
+    "always 0": np.zeros((3, 3)),
+    "wrong sign": -np.eye(3),
+    "cm/s": 100.0 * np.eye(3),
+    "m/s as cm/s": 0.01 * np.eye(3),
+    "km/h": 3.6 * np.eye(3),
+    "knots": 1.9438 * np.eye(3),
+    "m/s as knots": 0.5144 * np.eye(3),
+    "feet a second": 3.2808 * np.eye(3),
+    "north, east, down": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
+    "down for up": np.diag([1.0, 1.0, -1.0]),
+}
+SLOWEST_HZ = 0.1
+MISMATCHES = ("velocity and positions", "climb rate and positions")
 OF_REPORTS = tuple(part.name for part in REPORT)
 
 
@@ -53,7 +70,7 @@ OF_REPORTS = tuple(part.name for part in REPORT)
 class Heard:
     """What came of one session: when each part was found wrong, s after its start, and how near sums came to saying so."""
 
-    found_s: dict[str, float]
+    found_s: dict[str, float]  # also of `MISMATCHES`
     nearest: float  # the greatest level over the level at which something is said
 
 
@@ -80,7 +97,25 @@ def run(runs: int = 20, seed: int = 1, *, rrd: Path | None = None, progress: Pro
     each = tuple(text for name in ESTIMATORS for text in (f"{name}: said %", "after s"))
     columns = ("case", "noise", "reports, Hz", "times stated", *each, "else said", "nearest")
     table = Table(f"a noise that is not as stated, {runs} runs", columns, tuple(rows), NOTES)
-    return Study("noise", runs, seed, (table,), figures)
+    wrong_velocities, more = _wrong_velocities(max(runs // CROWD, 1), seed)
+    return Study("noise", runs, seed, (table, wrong_velocities), figures | more)
+
+
+def _wrong_velocities(runs: int, seed: int) -> tuple[Table, dict[str, float]]:
+    """In what share of the sessions it is said that velocities are not those of the positions, and after how long."""
+    rows: list[tuple[str | float, ...]] = []
+    figures: dict[str, float] = {}
+    for wrong, rate_hz in itertools.product(VELOCITIES, (SLOWEST_HZ, *RATES_HZ)):
+        heard = list(sessions("approach", wrong, rate_hz, 1.0, ESTIMATORS[0], runs, seed))
+        cells: list[float] = []
+        for what in MISMATCHES:
+            times = [one.found_s[what] for one in heard if what in one.found_s]
+            cells += [100.0 * len(times) / runs, float(np.median(times)) if times else math.nan]
+        others = sum(len(set(one.found_s) - set(MISMATCHES)) for one in heard)
+        figures |= {f"said {wrong} at {rate_hz:g} Hz": max(cells[0], cells[2])}
+        rows.append((wrong, rate_hz, *cells, others))
+    columns = ("velocities are", "reports, Hz", "said %", "after s", "climb: said %", "after s", "else said")
+    return Table(f"velocities that are not those of their positions, {runs} runs", columns, tuple(rows)), figures
 
 
 NOTES = (
@@ -104,9 +139,10 @@ def _settings(name: str) -> Iterator[tuple[str, float, float]]:
 def sessions(
     name: str, part: str, rate_hz: float, wrong: float, estimator: EstimatorName, runs: int, seed: int
 ) -> Iterator[Heard]:
-    """Sessions of a scene in which the noise of a part ("" = none) is so many times what is stated."""
+    """Sessions of a scene in which the noise of a part ("" = none) is so many times what is stated, or velocities are wrong."""
     stated = build_scene(name, start_ns=0, seed=seed, changes=[f"gps.period_s={1.0 / rate_hz}"])
-    simulated = _changed(stated, part, wrong) if part else stated
+    simulated = _changed(stated, part, wrong) if part in SIMULATED else stated
+    turned = VELOCITIES.get(part)
     frame = RunwayFrame(stated.site.runway)
     radars = {one.site.number: _as_simulated(one) for one in stated.radars}
     gps = stated.gps
@@ -121,7 +157,7 @@ def sessions(
             [
                 one
                 for aircraft in simulated.aircraft
-                if (one := _measured(simulated, aircraft, position, radars, frame, draw))
+                if (one := _turned(_measured(simulated, aircraft, position, radars, frame, draw), turned))
             ]
             for draw in drawn
         ]
@@ -138,6 +174,13 @@ def _changed(scene: Scene, part: str, times: float) -> Scene:
     changed = [replace(one.parameters, **{field: times * getattr(one.parameters, field)}) for one in scene.radars]
     radars = tuple(replace(one, parameters=new) for one, new in zip(scene.radars, changed, strict=True))
     return replace(scene, radars=radars)
+
+
+def _turned(measures: list[Measure], by: Floats | None) -> list[Measure]:
+    """The same with reports' velocities multiplied by a matrix, where there is one."""
+    if by is None:
+        return measures
+    return [replace(one, velocity_mps=by @ one.velocity_mps) if isinstance(one, Fix) else one for one in measures]
 
 
 def _as_simulated(radar: SceneRadar) -> RadarSite:
@@ -192,13 +235,16 @@ def listened(tracks: Sequence[list[Event]], position: PositionSource, radars: di
     """What comes of the events of some tracks, heard second by second."""
     told = sorted(((place, event) for place, one in enumerate(tracks) for event in one), key=lambda one: one[1].at)
     known, found, nearest = Consistency(), dict[str, float](), 0.0
-    parts = [part.name for part in (*REPORT, *PLOT)]
-    for second, some in itertools.groupby(told, key=lambda one: one[1].at // SECOND):
+    by_second = {second: list(some) for second, some in itertools.groupby(told, key=lambda one: one[1].at // SECOND)}
+    for second in range(min(by_second, default=0), max(by_second, default=-1) + 1):
         known, findings = (
-            known.hearing(some).planning((second + 1) * SECOND).judged(position, radars, (second + 2) * SECOND)
+            known.hearing(by_second.get(second, ()))
+            .planning((second + 1) * SECOND)
+            .judged(position, radars, (second + 2) * SECOND)
         )
         for one in findings:
-            part = next(name for name in parts if f"scatter of {name}," in one.topic)
+            part = one.topic.removeprefix("scatter of ").split(",")[0]
             found.setdefault(part, second + 1.0 - told[0][1].at / SECOND)
-        nearest = max(nearest, float(known.levels.max(initial=0.0)) / known.sure)
+        against = known.displacements.sums[:, :, EVIDENCE].max(initial=0.0)
+        nearest = max(nearest, max(float(known.levels.max(initial=0.0)), float(against)) / known.sure)
     return Heard(found, nearest)
