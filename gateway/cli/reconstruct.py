@@ -5,8 +5,7 @@ from __future__ import annotations
 import json as text
 import math
 import sys
-from dataclasses import replace
-from datetime import UTC, datetime
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,7 +16,7 @@ from gateway.cli.failures import RunError, UsageError, writing
 from gateway.cli.replay_options import FilesArgument, MuteOption
 
 if TYPE_CHECKING:
-    from gateway.offline.carrying import Place
+    from gateway.offline.carrying import Muted, Place
     from gateway.offline.reconstruction import How, Sortie
     from gateway.runtime.playback import Playback
     from gateway.runtime.setup import Place as SitePlace
@@ -27,7 +26,8 @@ Rebuild the flights of a recording from what its aircraft said of airspeed, atti
 airspeed, integrated from lift-off on, and closed onto where they ended; that tells the wind (paper 002-2).
 
 Positions are not used, but for where lift-off was, unless --with-gps ties the path to them; what was rebuilt is held against
-them where there are any.
+them where there are any. Accelerations (50 a second) tell how the wind changed. What a landing radar saw (a capture, a session)
+ties the path too, once it is told which of its plots are this aircraft's; --without-radar leaves it out.
 
 Examples:
 
@@ -38,6 +38,10 @@ Examples:
   talkdown reconstruct flight.tlog --site field.toml --close-on threshold
 
   talkdown reconstruct flight.tlog --with-gps --mute gps:120:400
+
+  talkdown reconstruct flight.tlog radar.pcap --site field.toml
+
+  talkdown reconstruct sessions/20260301T120000Z-demo-field --archive flights
 """
 
 CloseOption = Annotated[
@@ -89,6 +93,12 @@ RunwayOption = Annotated[
 WithGpsOption = Annotated[
     bool, typer.Option("--with-gps", help="Tie the paths to the positions that were told; --mute leaves some out.")
 ]
+WithoutRadarOption = Annotated[
+    bool, typer.Option("--without-radar", help="Do not tie the paths to what a landing radar saw.")
+]
+ConstantWindOption = Annotated[
+    bool, typer.Option("--constant-wind", help="Close as printed, with one wind, whatever accelerations tell.")
+]
 
 
 def register(app: typer.Typer) -> None:
@@ -105,6 +115,8 @@ def reconstruct(
     landing_speed: LandingOption = None,
     runway_direction: RunwayOption = None,
     with_gps: WithGpsOption = False,
+    without_radar: WithoutRadarOption = False,
+    constant_wind: ConstantWindOption = False,
     mute: MuteOption = None,
     archive: take.ArchiveOption = None,
     quiet: take.QuietOption = False,
@@ -112,23 +124,27 @@ def reconstruct(
 ) -> None:
     """Rebuild flights."""
     from adapters.files import FileError
+    from gateway.cli.reconstruct_shown import show
     from gateway.runtime.flights import document
     from gateway.runtime.folder import FolderError
     from gateway.runtime.playback import open_playback
     from gateway.runtime.seeking import SeekError
 
-    how = _how(take_off_speed, landing_speed, lift_off, close_on, runway_direction, take.read_place(site))
+    place = take.read_place(site)
+    how = _how(take_off_speed, landing_speed, lift_off, close_on, runway_direction, place)
     try:
         playback = open_playback(files)
-        how = replace(how, fixes=with_gps, muted=_muted(playback, mute))
-        found = _rebuilt(playback, how, quiet)
+        gps, radars = _muted(playback, mute)
+        how = replace(how, fixes=with_gps, muted=gps, radars_muted=radars, inertial=not constant_wind)
+        session = files[0] if files[0].is_dir() else None
+        found = _rebuilt(playback, how, Around(place, session, not without_radar), quiet)
     except (FileError, FolderError, SeekError) as error:
         raise UsageError(str(error)) from error
     kept = None if archive is None else _archive(found, archive / f"{files[0].resolve().stem}-flights")
     if json:
         print(text.dumps(document(found)))
     elif not quiet:
-        _show(found)
+        show(found)
         if kept is not None:
             print(f"archived in {kept}; look: rerun {kept / 'flights.rrd'}")
 
@@ -182,36 +198,56 @@ def _read_place(written: str, option: str, others: str = "") -> Place:
     return math.radians(latitude), math.radians(longitude)
 
 
-def _muted(playback: Playback, mutes: list[str] | None) -> tuple[tuple[int, int], ...]:
-    """From when to when positions tie nothing, ns UTC. Raises SeekError."""
+@dataclass(frozen=True, slots=True)
+class Around:
+    """The site that was given, the session that the recording is, and whether its radars are asked."""
+
+    place: SitePlace | None
+    session: Path | None
+    asks_radars: bool
+
+
+def _muted(playback: Playback, mutes: list[str] | None) -> tuple[Muted, tuple[tuple[int, Muted], ...]]:
+    """From when to when, ns UTC, positions tie nothing, and plots of a radar (0: of all). Raises SeekError, UsageError."""
     if not mutes:
-        return ()
+        return (), ()
     span = playback.span()
     found = [span.mute(one) for one in mutes]
-    if any(mute.what != "gps" or mute.number is not None for mute in found):
-        raise UsageError("Of a reconstruction only positions can be muted, all of them: write --mute gps:60:90.")
-    return tuple((mute.since + span.utc_offset, mute.until + span.utc_offset) for mute in found)
+    if any(mute.what == "gps" and mute.number is not None for mute in found):
+        raise UsageError("Positions are muted of all aircraft at once: write --mute gps:60:90.")
+    times = [(mute, ((mute.since + span.utc_offset, mute.until + span.utc_offset),)) for mute in found]
+    gps = tuple(time for mute, when in times if mute.what == "gps" for time in when)
+    return gps, tuple((mute.number or 0, when) for mute, when in times if mute.what == "radar")
 
 
-def _rebuilt(playback: Playback, how: How, quiet: bool) -> dict[str, list[Sortie]]:
-    """Every sortie of every aircraft. Raises FileError, RunError where there is nothing to rebuild."""
+def _rebuilt(playback: Playback, how: How, around: Around, quiet: bool) -> dict[str, list[Sortie]]:
+    """Every sortie of every aircraft. Raises FileError, FolderError, RunError where there is nothing to rebuild."""
     from gateway.cli.progress import progressing
     from gateway.offline.reconstruction import Unplaced, reconstructed
-    from gateway.runtime.flights import read_parameters
+    from gateway.runtime.flights import radar_tracks, radar_views, read_recorded
 
     with progressing("reading", show=not quiet) as tell:
-        parameters = read_parameters(playback, tell)
-    flyable = {name: one for name, one in parameters.items() if one.lacks() is None}
+        recorded = read_recorded(playback, tell)
+    flyable = {name: one for name, one in recorded.aircraft.items() if one.lacks() is None}
     if not flyable:
-        lacking = {name: one.lacks() for name, one in parameters.items()}
+        lacking = {name: one.lacks() for name, one in recorded.aircraft.items()}
         told = "; ".join(f"{name} tells no {what}" for name, what in lacking.items()) or "no aircraft tells anything"
         raise RunError(f"Nothing can be rebuilt, because a path needs airspeed and attitude: {told}.")
     for name in (name for name, one in flyable.items() if not one.flies_by_its_nose and not quiet):
         print(f"{name} is no aeroplane: it need not move where its nose points.", file=sys.stderr)
+    views = radar_views(recorded, playback, around.place, around.session) if around.asks_radars else []
+    tracks = radar_tracks(around.session) if views and around.session is not None else {}
+    if around.asks_radars and recorded.sightings.plots and not views and not quiet:
+        print("Nothing tells where the radar stands: give a site file with --site to use what it saw.", file=sys.stderr)
+    found: dict[str, list[Sortie]] = {}
     try:
-        return {name: reconstructed(one, how) for name, one in flyable.items()}
+        with progressing("rebuilding", show=not quiet) as tell:
+            for name, one in flyable.items():
+                found[name] = reconstructed(one, how, views, tracks.get(name, ()))
+                tell(len(found) / len(flyable))
     except Unplaced as error:
         raise UsageError(f"{str(error).capitalize()}: tell it with --lift-off LAT,LON.") from error
+    return found
 
 
 def _archive(found: dict[str, list[Sortie]], folder: Path) -> Path:
@@ -223,61 +259,3 @@ def _archive(found: dict[str, list[Sortie]], folder: Path) -> Path:
         write_flights(found, folder)
         draw(found, folder / "flights.rrd")
     return folder
-
-
-def _show(found: dict[str, list[Sortie]]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console(highlight=False)
-    table = Table(box=None, padding=(0, 1, 0, 0))
-    for place, heading in enumerate(("sortie", "lift-off", "lasted", "km", "end", "wind, m/s", "RMSE", "of way")):
-        table.add_column(heading, justify="right" if place > 1 else "left", no_wrap=True)
-    for aircraft, sorties in found.items():
-        if not sorties:
-            console.print(f"{aircraft} has no sortie: its airspeed never stays above the take-off speed for a minute.")
-        for number, sortie in enumerate(sorties, 1):
-            table.add_row(*_cells(f"{aircraft} {number}", sortie))
-    if table.row_count:
-        console.print(table)
-    for aircraft, sorties in found.items():
-        for number, sortie in enumerate(sorties, 1):
-            for note in _notes(sortie):
-                console.print(f"{aircraft} {number}: {note}", soft_wrap=True)
-
-
-def _cells(name: str, sortie: Sortie) -> tuple[str, ...]:
-    """`end`: how far the open path ended from where it should have, m; `RMSE` beside the positions, m, and of their way."""
-    began = datetime.fromtimestamp(int(sortie.time[0]) // 1_000_000_000, UTC)
-    minutes, seconds = divmod(round(sortie.duration_s), 60)
-    east, north = sortie.wind_mps.mean(axis=0)
-    wind = "-"
-    if not math.isnan(east):
-        wind = f"{math.hypot(east, north):.1f} from {math.degrees(math.atan2(-east, -north)) % 360:03.0f}"
-    end = "-" if math.isnan(sortie.end_error_m) else f"{sortie.end_error_m:.0f} m"
-    head = (name, f"{began:%H:%M:%S}", f"{minutes}:{seconds:02d}", f"{sortie.length_m / 1000:.1f}", end, wind)
-    beside = sortie.compared
-    if beside is None or beside.length_m == 0.0:
-        return (*head, "-", "-")
-    return (*head, f"{beside.rmse_m:.1f} m", f"{100 * beside.rmse_m / beside.length_m:.2f} %")
-
-
-def _notes(sortie: Sortie) -> list[str]:
-    """What a person should know of a sortie beside its row."""
-    notes = []
-    if not sortie.landed:
-        notes.append("the recording ends in the air: the path is not closed.")
-    elif not sortie.took_off and math.isnan(sortie.end_error_m):
-        notes.append("the recording begins in the air: the path is not closed (--close-on LAT,LON).")
-    if not math.isnan(sortie.heading_bias_rad):
-        bias, sigma = (math.degrees(one) for one in (sortie.heading_bias_rad, sortie.heading_bias_sigma_rad))
-        notes.append(f"on the take-off roll the heading showed {bias:+.1f} +- {sigma:.1f} degrees; it was taken off.")
-    if sortie.fixes:
-        notes.append(f"tied to {sortie.fixes} positions; 1 sigma at worst {sortie.sigma_m.max():.0f} m an axis.")
-    if sortie.height_by == "pitch":
-        notes.append(
-            "neither pressure nor altitude is told: its height is that of the pitch, which drifts by kilometres."
-        )
-    if sortie.lift_off is None:
-        notes.append("nothing tells where it lifted off: the path is in metres from there (--lift-off LAT,LON).")
-    return notes

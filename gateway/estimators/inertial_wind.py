@@ -23,14 +23,12 @@ from gateway.geodesy import STANDARD_GRAVITY_MPS2
 
 Floats = NDArray[np.float64]
 
-TILT_MPS_PER_SQRT_S = 0.15  # an attitude wrong by 0.2 degrees for ten seconds at a time
+TILT_MPS_PER_SQRT_S = 0.23  # an attitude wrong by 0.3 degrees for ten seconds at a time
 BIAS_SIGMA_MPS2 = 0.5  # of cheap accelerometers, before they are seen at rest
 STANDS_SIGMA_MPS = 0.1
 STANDS_SIGMA_MPS2 = 0.05  # of what is felt at rest: an attitude 0.3 degrees wrong
-AIR_SIGMA_MPS, AIR_SIGMA_SHARE = (
-    1.0,
-    0.03,
-)  # of the velocity through the air over a knot's time: sideslip, heading, gusts
+# Of the velocity through the air over a knot's time: sideslip, heading, gusts.
+AIR_SIGMA_MPS, AIR_SIGMA_SHARE = 1.5, 0.03
 _STANDS_FOR_S = 3.0
 _STILL_MPS2, _STILL_RAD = 0.1, math.radians(0.5)  # at most: one sigma of the felt force, the span of roll and of pitch
 _STILLEST_MPS2 = 0.03  # the noise of a cheap accelerometer: nothing is stiller

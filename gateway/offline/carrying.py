@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +25,7 @@ END_SIGMA_M = 1.0  # of a place on which a path is closed
 USUAL_SIGMA_M = 3.0  # of a position whose stream does not say
 GAP_S = 10.0  # a longer silence is not integrated over
 FELT_HZ = 5.0  # accelerations that come less often on average tell nothing
-TELLS_SHARE = 0.67  # of the sigma without: accelerations that leave more (vibration, few samples) do not bend the wind
+TELLS_SHARE = 0.8  # of the sigma without: accelerations that leave more (vibration, few samples) do not bend the wind
 _FIXES_APART_NS = SECOND
 
 
@@ -49,7 +50,7 @@ def carried(
 
     Where fixes tell, that it came back to where it lifted off is no more than a guess; a place that was given is one of them.
     """
-    ends = None if target_m is None else Known.places(time_s[-1:], target_m[None], np.array([END_SIGMA_M]))
+    ends = None if target_m is None else ending(time_s, target_m)
     if fixes is not None:
         return tied(time_s, path_m, fixes if ends is None or usual_end else fixes.and_also(ends), evidence)
     if ends is None or target_m is None:
@@ -61,6 +62,23 @@ def carried(
             return found
     path, wind = paths.closed(time_s, path_m, target_m)
     return Closed(path, np.broadcast_to(wind, path.shape), usual.sigma_m)
+
+
+def ending(time_s: Floats, target_m: Floats) -> Known:
+    """That the path ends at a place (2,), m."""
+    return Known.places(time_s[-1:], target_m[None], np.array([END_SIGMA_M]))
+
+
+def together(one: Known | None, other: Known | None) -> Known | None:
+    """Both, or which of them there is."""
+    if one is None or other is None:
+        return other if one is None else one
+    return one.and_also(other)
+
+
+def tying(time_s: Floats, path_m: Floats, sure: Known | None, evidence: WindEvidence | None) -> Callable[[Known], Tied]:
+    """Ties the path to what is sure and to something else."""
+    return lambda known: tied(time_s, path_m, known if sure is None else sure.and_also(known), evidence)
 
 
 def evidence_of(felt: Felt, time_s: Floats, velocity_mps: Floats, lift_off: Place | None) -> WindEvidence | None:
@@ -97,3 +115,8 @@ def level_m(latitude_rad: Floats, longitude_rad: Floats, lift_off: Place) -> Flo
 def frame_at(lift_off: Place) -> RunwayFrame:
     """East, north and up at a place on the ellipsoid."""
     return RunwayFrame(Runway(*lift_off, height_m=0.0, landing_compass_rad=0.0))
+
+
+def on_plane(place_m: Floats) -> Floats:
+    """Places (..., 2) m along the earth as points (..., 3) of the frame at lift-off: the earth curves away from its plane."""
+    return np.concatenate([place_m, -np.sum(place_m**2, axis=-1, keepdims=True) / (2.0 * paths.EARTH_M)], axis=-1)

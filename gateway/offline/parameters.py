@@ -41,10 +41,15 @@ class Series:
     def __len__(self) -> int:
         return len(self._time)
 
+    def rows(self) -> tuple[Times, Floats]:
+        """Times (n,) ns, none falling, and values (n, width), all of them."""
+        time = np.array(self._time, dtype=np.int64)
+        order = np.argsort(time, kind="stable")
+        return time[order], np.array(self._values, dtype=np.float64).reshape(-1, self.width)[order]
+
     def columns(self) -> tuple[Times, Floats]:
         """Times (n,) strictly increasing, ns, and values (n, width); of several rows of one time the first."""
-        time = np.array(self._time, dtype=np.int64)
-        values = np.array(self._values, dtype=np.float64).reshape(-1, self.width)
+        time, values = self.rows()
         unique, first = np.unique(time, return_index=True)
         return unique, values[first]
 

@@ -6,6 +6,7 @@ Source: 002-2. Positions are used only for what is asked: where lift-off was, an
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,8 +15,25 @@ from numpy.typing import NDArray
 from gateway.estimators import flight_path as paths
 from gateway.estimators.inertial_wind import Felt
 from gateway.estimators.tied_path import Tied
-from gateway.offline.carrying import GAP_S, SECOND, Muted, Place, carried, evidence_of, fixes_of, frame_at, level_m
+from gateway.offline.carrying import (
+    GAP_S,
+    SECOND,
+    Muted,
+    Place,
+    carried,
+    ending,
+    evidence_of,
+    fixes_of,
+    frame_at,
+    level_m,
+    on_plane,
+    together,
+    tying,
+)
+from gateway.offline.compared import Compared, compared_with
 from gateway.offline.parameters import Flown, Parameters, Times
+from gateway.offline.radar_fixes import Seen, Way, seen
+from gateway.offline.sightings import View, seen_within
 
 Floats = NDArray[np.float64]
 
@@ -41,33 +59,7 @@ class How:
     fixes: bool = False  # whether positions tie the path
     inertial: bool = True  # whether accelerations tell how the wind changed, where they are told
     muted: Muted = ()  # positions of these times tie nothing
-
-
-@dataclass(frozen=True, slots=True)
-class Compared:
-    """The rebuilt path beside the positions that were told of the same times; distances are level, m."""
-
-    time: Times  # (m,)
-    place_m: Floats  # (m, 2) told: east and north of lift-off
-    height_m: Floats  # (m,) told, above the first of them
-    off_m: Floats  # (m,) the rebuilt path's distance
-    off_open_m: Floats  # (m,) the open path's
-    height_rmse_m: float
-
-    @property
-    def rmse_m(self) -> float:
-        """Of the rebuilt path."""
-        return math.sqrt(float(np.mean(self.off_m**2)))
-
-    @property
-    def open_rmse_m(self) -> float:
-        """Of the path through the air."""
-        return math.sqrt(float(np.mean(self.off_open_m**2)))
-
-    @property
-    def length_m(self) -> float:
-        """Of the way over the ground, by the positions."""
-        return float(np.linalg.norm(np.diff(self.place_m, axis=0), axis=1).sum())
+    radars_muted: tuple[tuple[int, Muted], ...] = ()  # and plots of these, of a radar by number, or, 0, of all
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,15 +86,14 @@ class Sortie:
     compared: Compared | None
     fixes: int
     by_accelerations: bool  # whether they told how the wind changed
+    radar: Seen | None  # which plots tie the path; None: no radar saw anything, or it was not asked
 
     @property
     def geodetic_deg(self) -> Floats | None:
         """Latitude and longitude (n, 2) of the path, degrees; None where nothing tells where it began."""
         if self.lift_off is None:
             return None
-        east, north = self.path_m.T
-        curved = -(east**2 + north**2) / (2.0 * paths.EARTH_M)  # on the ellipsoid, not on the plane that touches it
-        latitude, longitude, _ = frame_at(self.lift_off).geodetic_from_enu(np.stack([east, north, curved], axis=-1))
+        latitude, longitude, _ = frame_at(self.lift_off).geodetic_from_enu(on_plane(self.path_m))
         return np.degrees(np.stack([latitude, longitude], axis=-1))
 
     @property
@@ -123,8 +114,28 @@ def speeds(airspeed_mps: Floats) -> tuple[float, float]:
     return TAKE_OFF_SHARE * cruise, LANDING_SHARE * cruise
 
 
-def reconstructed(parameters: Parameters, how: How = How()) -> list[Sortie]:
-    """Every sortie of one aircraft, of which `parameters.lacks()` nothing; none where airspeed never rises. Raises Unplaced."""
+@dataclass(frozen=True, slots=True)
+class _Beside:
+    """What was told beside flight parameters: positions, accelerations, and what radars saw."""
+
+    places: tuple[Times, Floats]
+    felt: Felt | None
+    views: Sequence[View]
+    radar_tracks: Collection[str]
+
+    def since(self, seconds: float) -> _Beside:
+        """The same with seconds of accelerations counted from a later instant."""
+        return self if self.felt is None else replace(self, felt=replace(self.felt, time_s=self.felt.time_s - seconds))
+
+
+def reconstructed(
+    parameters: Parameters, how: How = How(), views: Sequence[View] = (), radar_tracks: Collection[str] = ()
+) -> list[Sortie]:
+    """Every sortie of one aircraft, of which `parameters.lacks()` nothing; none where airspeed never rises. Raises Unplaced.
+
+    `views`: what radars saw, which ties the paths; `radar_tracks` ("1/3"): which of their tracks are this aircraft, where that is
+    known.
+    """
     flown = Flown.of(parameters)
     if not len(flown.time):
         return []
@@ -133,34 +144,19 @@ def reconstructed(parameters: Parameters, how: How = How()) -> list[Sortie]:
     landing = min(usual[1], 0.75 * take_off) if how.landing_mps is None else how.landing_mps
     if not 0.0 < landing < take_off:
         return []
-    places = parameters.places.columns()
     felt = parameters.felt(int(flown.time[0])) if how.inertial and parameters.flies_by_its_nose else None
+    beside = _Beside(parameters.places.columns(), felt, views, radar_tracks)
     sorties: list[Sortie] = []
     for piece in flown.pieces(GAP_S):
         time_s = (piece.time - piece.time[0]) * 1e-9
-        found = paths.sorties(time_s, piece.airspeed_mps, take_off, landing)
-        sorties += [
-            _sortie(piece, first, end, take_off, places, _since(felt, flown, piece, first), how) for first, end in found
-        ]
+        for first, end in paths.sorties(time_s, piece.airspeed_mps, take_off, landing):
+            since = (int(piece.time[first]) - int(flown.time[0])) * 1e-9
+            sorties.append(_sortie(piece, first, end, take_off, beside.since(since), how))
     return sorties
 
 
-def _since(felt: Felt | None, flown: Flown, piece: Flown, first: int) -> Felt | None:
-    """What was felt, with seconds from a sortie's first sample."""
-    if felt is None:
-        return None
-    return replace(felt, time_s=felt.time_s - (piece.time[first] - flown.time[0]) * 1e-9)
-
-
-def _sortie(
-    flown: Flown,
-    first: int,
-    end: int,
-    take_off_mps: float,
-    places: tuple[Times, Floats],
-    felt: Felt | None,
-    how: How,
-) -> Sortie:
+def _sortie(flown: Flown, first: int, end: int, take_off_mps: float, beside: _Beside, how: How) -> Sortie:
+    places = beside.places
     part, took_off, landed = slice(first, end + 1), first > 0, end < len(flown.time) - 1
     time, time_s = flown.time[part], (flown.time[part] - flown.time[first]) * 1e-9
     bias = _heading_bias(flown, first, take_off_mps, how.runway_compass_rad)
@@ -181,8 +177,17 @@ def _sortie(
     knows_its_end = landed and (took_off or how.close_on != "lift-off")
     target = _target(how.close_on, lift_off) if knows_its_end else None
     fixes = fixes_of(places, time, lift_off, how.muted) if how.fixes and lift_off is not None else None
-    evidence = None if felt is None else evidence_of(felt, time_s, velocity[:, :2], lift_off)
-    found = carried(time_s, through_air[:, :2], target, fixes, evidence, isinstance(how.close_on, str))
+    positions = 0 if fixes is None else len(fixes.time_s) // 2
+    evidence = None if beside.felt is None else evidence_of(beside.felt, time_s, velocity[:, :2], lift_off)
+    usual_end = isinstance(how.close_on, str)
+    radar = None
+    if beside.views and lift_off is not None:
+        sure = together(fixes, None if usual_end or target is None else ending(time_s, target))
+        way = Way(int(time[0]), time_s, through_air[:, :2], height, lift_off)
+        plots = seen_within(beside.views, int(time[0]), int(time[-1]), how.radars_muted)
+        radar = seen(way, plots, beside.radar_tracks, tying(time_s, through_air[:, :2], sure, evidence))
+        fixes = together(fixes, radar.known if radar.used else None)
+    found = carried(time_s, through_air[:, :2], target, fixes, evidence, usual_end)
     return Sortie(
         time=time,
         open_m=through_air,
@@ -201,9 +206,10 @@ def _sortie(
         height_by=height_by,
         took_off=took_off,
         landed=landed,
-        compared=None if lift_off is None else _compared(places, time, through_air, found.path_m, height, lift_off),
-        fixes=0 if fixes is None else len(fixes.time_s) // 2,
+        compared=None if lift_off is None else compared_with(places, time, through_air, found.path_m, height, lift_off),
+        fixes=positions,
         by_accelerations=evidence is not None and isinstance(found, Tied),
+        radar=radar,
     )
 
 
@@ -248,24 +254,3 @@ def _nearest_place(places: tuple[Times, Floats], at: int) -> Place | None:
     if abs(int(time[nearest]) - at) > 5 * SECOND:
         return None
     return float(values[nearest, 0]), float(values[nearest, 1])
-
-
-def _compared(
-    places: tuple[Times, Floats], time: Times, open_m: Floats, path_m: Floats, height_m: Floats, lift_off: Place
-) -> Compared | None:
-    told_at, values = places
-    within = (told_at >= time[0]) & (told_at <= time[-1])
-    if np.count_nonzero(within) < 2:
-        return None
-    at_s = (told_at[within] - time[0]) * 1e-9
-    time_s = (time - time[0]) * 1e-9
-    told = level_m(values[within, 0], values[within, 1], lift_off)
-    rebuilt, alone = (
-        np.stack([np.interp(at_s, time_s, axis) for axis in one.T], -1) for one in (path_m, open_m[:, :2])
-    )
-    off, off_alone = (np.linalg.norm(one - told, axis=1) for one in (rebuilt, alone))
-    high = np.where(np.isnan(values[within, 2]), values[within, 3], values[within, 2])
-    high = high - high[0]
-    lower = np.interp(at_s, time_s, height_m) - high
-    height_rmse = math.sqrt(float(np.mean((lower - lower[0]) ** 2)))
-    return Compared(told_at[within], told, high, off, off_alone, height_rmse)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -14,10 +16,25 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from adapters.decode import Decoder
-from gateway.observation import AirData, Attitude, GpsReport, ImuSample, Many, Observation, VehicleStatus
+from gateway.observation import (
+    AirData,
+    Attitude,
+    GpsReport,
+    ImuSample,
+    Many,
+    Observation,
+    RadarPlot,
+    RadarStatus,
+    VehicleStatus,
+)
 from gateway.offline.parameters import Parameters
 from gateway.offline.reconstruction import Sortie
+from gateway.offline.sightings import Sightings, View, views
+from gateway.runtime.archived import read_table
+from gateway.runtime.folder import FolderError, read_record
 from gateway.runtime.playback import Playback
+from gateway.runtime.remembering import is_of
+from gateway.runtime.setup import Place
 
 _TOGETHER = 1000  # arrivals that are decoded at once
 _TIME = pa.timestamp("ns", tz="UTC")
@@ -30,27 +47,76 @@ SCHEMA = pa.schema(
 )
 
 
-def read_parameters(playback: Playback, tell: Callable[[float], None]) -> dict[str, Parameters]:
-    """The flight parameters of every aircraft of a recording, by name. Raises FileError."""
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What a recording tells of flights: each aircraft's parameters, by name, and what radars saw."""
+
+    aircraft: dict[str, Parameters]
+    sightings: Sightings
+
+    @classmethod
+    def none(cls) -> Recorded:
+        """Nothing yet."""
+        return cls({}, Sightings())
+
+
+def read_recorded(playback: Playback, tell: Callable[[float], None]) -> Recorded:
+    """The flight parameters of every aircraft of a recording, and its radars' plots. Raises FileError."""
     decoder = Decoder(playback.sources)
-    found: dict[str, Parameters] = {}
+    recorded = Recorded.none()
     left = iter(playback.arrivals())
     while some := list(islice(left, _TOGETHER)):
         for _, heard in decoder.hear_many(some)[0]:
             for observation in heard.observations:
-                _take(observation, found)
+                _take(observation, recorded)
         tell(playback.fraction())
-    return found
+    return recorded
 
 
-def _take(observation: Observation, found: dict[str, Parameters]) -> None:
+def _take(observation: Observation, recorded: Recorded) -> None:
     """Keep what paths can be made of with whom it is of."""
     if isinstance(observation, Many) and observation.kind is ImuSample:
-        _feel(observation, found)
+        _feel(observation, recorded.aircraft)
         return
     for one in observation if isinstance(observation, Many) else (observation,):
-        if isinstance(one, AirData | Attitude | GpsReport | ImuSample | VehicleStatus):
-            found.setdefault(one.aircraft, Parameters()).take(one)
+        if isinstance(one, RadarPlot | RadarStatus):
+            recorded.sightings.take(one)
+        elif isinstance(one, AirData | Attitude | GpsReport | ImuSample | VehicleStatus):
+            recorded.aircraft.setdefault(one.aircraft, Parameters()).take(one)
+
+
+def radar_views(recorded: Recorded, playback: Playback, place: Place | None, session: Path | None) -> list[View]:
+    """What the radars of a recording saw, at its place or another; of a session with what it learnt of them taken off.
+
+    None where nothing tells where the radars stand. Raises FileError, FolderError.
+    """
+    if not recorded.sightings.plots:
+        return []
+    place = place or playback.place or playback.find_place()
+    if place is None:
+        return []
+    record = None if session is None else read_record(session)
+    learnt = None if record is None else record.registered or record.registration
+    if learnt is not None and not is_of(learnt, place.site):
+        learnt = None
+    return views(recorded.sightings, place.site, learnt)
+
+
+def radar_tracks(session: Path) -> dict[str, set[str]]:
+    """Of each aircraft of a session's tracks which tracks of radars ("1/3") were taken for it; none without such a table."""
+    try:
+        table = read_table(session, "tracks", ("aircraft", "radar_track"))
+    except FolderError:
+        return {}
+    pairs = Counter(zip(table["aircraft"].to_pylist(), table["radar_track"].to_pylist(), strict=True))
+    most: dict[str, tuple[int, str]] = {}
+    for (aircraft, names), count in pairs.items():
+        for name in (names or "").split() if aircraft else ():
+            most[name] = max(most.get(name, (0, "")), (count, aircraft))
+    found: dict[str, set[str]] = {}
+    for name, (_, aircraft) in most.items():
+        found.setdefault(aircraft, set()).add(name)
+    return found
 
 
 def _feel(samples: Many, found: dict[str, Parameters]) -> None:
@@ -99,7 +165,15 @@ def _told(sortie: Sortie) -> dict[str, Any]:
         "heading_bias_sigma_deg": math.degrees(sortie.heading_bias_sigma_rad),
         "height_by": sortie.height_by,
         "fixes": sortie.fixes,
+        "by_accelerations": sortie.by_accelerations,
     }
+    if (radar := sortie.radar) is not None:
+        told["radar"] = {
+            "plots_used": radar.used,
+            "plots_refused": radar.of - radar.used,
+            "radar_tracks": list(radar.tracks),
+            "doubt": radar.doubt,
+        }
     if (beside := sortie.compared) is not None:
         told["beside_positions"] = {
             "positions": len(beside.time),
