@@ -12,10 +12,11 @@ from gateway.estimators.kalman import ERROR, POSITION
 from gateway.fuse import Lane
 from gateway.fusing import Fusing
 from gateway.picture import Event
-from gateway.reckon import JUMPED, NOTHING, Reckoned
+from gateway.reckon import DISAGREES, JUMPED, NOTHING, Reckoned
 
 SERIAL = -2  # of what was not heard
 GPS_GONE_S = 3.0  # without a position for so long a radar shows dead reckoning where the vehicle is
+WALK_MPS = 2.0  # what walks off so fast should be told
 CORRELATED = 2.0  # a track's errors last for more than the second between two looks at it
 
 
@@ -44,6 +45,7 @@ class Reckoning(Fusing):
             if found is None or lane is None or not lane.events or lane.ended_at is not None:
                 continue
             self.reckoned.append(found)
+            self._tell_walks(found)
             if found.denied != NOTHING and before.denied(aircraft) == NOTHING:
                 # also what has come since the second, and has entered the track, is not believed
                 self._go_on(lane, self.reckoners.of(aircraft, now) or found, is_forced=True)
@@ -85,6 +87,20 @@ class Reckoning(Fusing):
         told = (float(latitude), float(longitude), float(height), math.nan, math.nan, math.nan, level, upright, 1e3)
         self.reckoners = self.reckoners.pictured(aircraft, event.at, told)
 
+    def _tell_walks(self, found: Reckoned) -> None:
+        """Say of each vehicle, once, which positions that walk off its inertial data would deny."""
+        if math.isnan(found.told_from_mps):
+            return
+        least, words = f"{found.told_from_mps:.1f} m/s", self.reckoners.by(found.aircraft).words
+        if found.told_from_mps <= WALK_MPS:
+            text = f"{found.aircraft}: a position that walks off at {least} or more is denied by {words}"
+        else:
+            text = (
+                f"{found.aircraft}: {words} tell a position that walks off with velocities to match from {least} on only;"
+                " one that jumps, begins to walk at once, or leaves its own velocities, is told sooner"
+            )
+        self.once(text, "info", f"{found.aircraft}: walks")
+
     def _tell_denied(self, aircraft: str, before: int, now: int, at: int) -> None:
         if before == now:
             return
@@ -92,7 +108,7 @@ class Reckoning(Fusing):
             self.events.append(Event(at, "info", f"{aircraft}: what it says of its position agrees again, and is used"))
             return
         how = "jumped" if now == JUMPED else "walks off slowly"
-        what = self.reckoners.by(aircraft).words
+        what = "its own velocities" if now == DISAGREES else self.reckoners.by(aircraft).words
         text = f"{aircraft}: what it says of its position {how}, which {what} deny: it is not used"
         self.count("position sources denied")
         self.events.append(Event(at, "warning", text))

@@ -17,6 +17,9 @@ from gateway.estimators.inertial import Motion
 
 Floats = NDArray[np.float64]
 
+START = (math.radians(47.4), math.radians(8.5), 500.0)
+BIAS_LASTS_S = 60.0  # between two values of a bias that wanders
+
 
 @dataclass(frozen=True, slots=True)
 class Errors:
@@ -26,6 +29,8 @@ class Errors:
     force_bias_mps2: float = 0.03
     rate_noise: float = math.radians(0.01)
     force_noise: float = 0.005
+    rate_wanders_radps: float = 0.0  # biases that are others after a minute or two: temperature, what rotors shake
+    force_wanders_mps2: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +86,11 @@ def measured(truth: Ride, errors: Errors, generator: np.random.Generator) -> tup
     )
     rate = truth.rate_radps + rate_bias + errors.rate_noise / np.sqrt(steps) * generator.standard_normal(shape)
     force = truth.force_mps2 + force_bias + errors.force_noise / np.sqrt(steps) * generator.standard_normal(shape)
+    for sigma, told in ((errors.rate_wanders_radps, rate), (errors.force_wanders_mps2, force)):
+        if sigma > 0.0:
+            middle, most = 0.5 * (truth.time_s[1:] + truth.time_s[:-1]), 3.0 * sigma
+            for axis in range(3):
+                told[:, axis] += wandering(generator, middle, 0.0, sigma, BIAS_LASTS_S, -most, most)
     return rate, force
 
 
@@ -95,31 +105,28 @@ def _vector(turned: Floats) -> Floats:
 def car(generator: np.random.Generator, length_s: float, rate_hz: float = 50.0) -> Ride:
     """A car in a town and on a road: 4 to 25 m/s, bends at random times, level."""
     time = np.arange(0.0, length_s + 0.5 / rate_hz, 1.0 / rate_hz)
-    speed = _wandering(generator, time, 15.0, 7.0, 12.0, 4.0, 25.0)
-    rate = _bends(generator, time, 0.25)
+    speed = wandering(generator, time, 15.0, 7.0, 12.0, 4.0, 25.0)
+    rate = bends(generator, time, 0.25)
     heading = generator.uniform(0.0, 2.0 * math.pi) + np.concatenate([[0.0], np.cumsum(rate[1:] / rate_hz)])
     velocity = np.stack([speed * np.cos(heading), speed * np.sin(heading), np.zeros_like(speed)], axis=-1)
     level = np.zeros_like(time)
-    return ride(time, velocity, ins.from_angles(level, level, heading), _START, np.zeros((len(time), 2)))
+    return ride(time, velocity, ins.from_angles(level, level, heading), START, np.zeros((len(time), 2)))
 
 
 def aeroplane(generator: np.random.Generator, length_s: float, rate_hz: float = 50.0) -> Ride:
     """A small aeroplane: 25 m/s through the air, in a wind of about 8 m/s that wanders; coordinated turns, slow climbs."""
     time = np.arange(0.0, length_s + 0.5 / rate_hz, 1.0 / rate_hz)
-    airspeed = _wandering(generator, time, 25.0, 1.0, 8.0, 20.0, 30.0)
-    rate = _bends(generator, time, 0.12)
+    airspeed = wandering(generator, time, 25.0, 1.0, 8.0, 20.0, 30.0)
+    rate = bends(generator, time, 0.12)
     heading = generator.uniform(0.0, 2.0 * math.pi) + np.concatenate([[0.0], np.cumsum(rate[1:] / rate_hz)])
-    climb = _wandering(generator, time, 0.0, 0.8, 20.0, -2.0, 2.0)
+    climb = wandering(generator, time, 0.0, 0.8, 20.0, -2.0, 2.0)
     wind = 8.0 * _direction(generator) + np.stack(
-        [_wandering(generator, time, 0.0, 0.7, 60.0, -3.0, 3.0) for _ in range(2)], axis=-1
+        [wandering(generator, time, 0.0, 0.7, 60.0, -3.0, 3.0) for _ in range(2)], axis=-1
     )
     level = np.sqrt(airspeed**2 - climb**2)
     velocity = np.stack([level * np.cos(heading) + wind[:, 0], level * np.sin(heading) + wind[:, 1], -climb], axis=-1)
     roll, pitch = np.arctan(rate * airspeed / 9.81), np.arcsin(climb / airspeed)
-    return ride(time, velocity, ins.from_angles(roll, pitch, heading), _START, wind)
-
-
-_START = (math.radians(47.4), math.radians(8.5), 500.0)
+    return ride(time, velocity, ins.from_angles(roll, pitch, heading), START, wind)
 
 
 def _direction(generator: np.random.Generator) -> Floats:
@@ -127,7 +134,7 @@ def _direction(generator: np.random.Generator) -> Floats:
     return np.array([math.cos(angle), math.sin(angle)])
 
 
-def _wandering(
+def wandering(
     generator: np.random.Generator, time_s: Floats, mean: float, sigma: float, over_s: float, least: float, most: float
 ) -> Floats:
     """A smooth random course of a quantity: knots every `over_s`, between bounds."""
@@ -135,7 +142,7 @@ def _wandering(
     return _smooth(knots, np.clip(mean + sigma * generator.standard_normal(len(knots)), least, most), time_s)
 
 
-def _bends(generator: np.random.Generator, time_s: Floats, fastest: float) -> Floats:
+def bends(generator: np.random.Generator, time_s: Floats, fastest: float) -> Floats:
     """Rates of turn: straight half of the time, bends of 4 to 12 s."""
     knots = np.arange(time_s[0] - 12.0, time_s[-1] + 12.0, 4.0)
     chosen = generator.uniform(-fastest, fastest, len(knots)) * (generator.random(len(knots)) < 0.4)

@@ -49,10 +49,16 @@ class Teller:
 
     @classmethod
     def of(
-        cls, aircraft: str, vehicle_type: int, ride: Ride, generator: np.random.Generator, falsified: Falsified = honest
+        cls,
+        aircraft: str,
+        vehicle_type: int,
+        ride: Ride,
+        generator: np.random.Generator,
+        falsified: Falsified = honest,
+        errors: Errors = Errors(),
     ) -> Teller:
         """With a unit, an autopilot and a receiver as usual."""
-        rate, force = measured(ride, Errors(), generator)
+        rate, force = measured(ride, errors, generator)
         count = len(ride.time_s)
         step_s = float(ride.time_s[1] - ride.time_s[0])
         leaning = np.array(AUTOPILOT_RAD) * lasting(generator, count, step_s / LASTS_S)

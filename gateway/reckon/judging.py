@@ -9,17 +9,27 @@ neither wings nor wheels hold the velocity, they must have proved as sure as the
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators import dead_reckoning as dr
 from gateway.estimators.dead_reckoning import Reckoning
-from gateway.estimators.inertial import between
-from gateway.reckon.cells import SECOND_CELLS
+from gateway.estimators.inertial import between, displaced
+from gateway.reckon.cells import CELL_S, SECOND_CELLS
 from gateway.reckon.proving import compared, is_proved
-from gateway.reckon.tip import BRANCHES, JUMPED, NOTHING, WALKED_OFF, Tip, hypothesis, with_each, with_hypothesis
+from gateway.reckon.tip import (
+    DISAGREES,
+    JUMPED,
+    NOTHING,
+    WALKED_OFF,
+    Tip,
+    hypothesis,
+    with_each,
+    with_hypothesis,
+    with_rows,
+)
+from gateway.reckon.walking import OFF_MPS, WANDERS_M, followed, forgotten, walks_away, walks_still
 from gateway.settings import DeadReckoning
 
 Floats = NDArray[np.float64]
@@ -30,8 +40,9 @@ WALKED = 33.4  # once in 10^6: they have 7200 hypotheses
 NEAR = 13.3  # once in a hundred
 AGREES_FOR = 10  # positions in a row, half a second apart, until one that was refused is believed
 TRUSTED_AFTER = 30 * SECOND_CELLS  # since it began: before that it has not learnt its own errors
+TELLS_AT_S = 14.0  # so old is the hypothesis that says which walks would be denied
 OLD_ENOUGH = 4 * SECOND_CELLS  # a hypothesis without GPS that denies
-WANDERS_M, WANDERS_MPS = 1.5, 0.15  # what good sources' errors change by within half a minute
+WANDERS_MPS = 0.15  # what good sources' errors change by within half a minute, beside `walking.WANDERS_M`
 LEAST_M, LEAST_MPS = 0.5, 0.1  # of the scatter that a source is taken to have
 MOST_TIMES = 10.0  # the least, or what is stated if that is more: no source is taken to scatter by more
 LEARNS = 0.05  # of each position, for the scatter
@@ -51,19 +62,26 @@ def judged(tip: Tip, place: Floats, late_s: Floats, held: Bools, unseen: Floats,
     off = between(latitude, longitude, height, motion) + motion.velocity_mps * late
     faster = place[:, None, 3:6] + tip.accelerated_mps2[:, None] * late - motion.velocity_mps
     worst = _square(off[..., :2], faster[..., :2], tip)
-    trusted = (tip.cell - tip.began >= TRUSTED_AFTER) & np.array(settings.refuses)
+    tip, walked, square = followed(tip, place, late_s)
+    refuses = np.array(settings.refuses)
+    trusted = (tip.cell - tip.began >= TRUSTED_AFTER) & refuses
     jumps = trusted & (worst[:, 0] > FAR)
     old = tip.cell[:, None] - tip.seeded[:, 1:] >= OLD_ENOUGH
     bound = np.where(held, WALKED, WALKED * np.maximum(tip.times, 1.0))
     walks = (trusted & (held | is_proved(tip)))[:, None] & old & (worst[:, 1:] > bound[:, None])
+    disagrees = walks_away(tip, square) & refuses
     refused = tip.denied != NOTHING
-    agreed = np.where(refused & (worst[:, 0] < NEAR), tip.agreed + 1, 0)
+    still = (tip.denied == DISAGREES) & walks_still(tip, square)
+    agreed = np.where(refused & (worst[:, 0] < NEAR) & ~still, tip.agreed + 1, 0)
     returns = refused & (agreed >= AGREES_FOR)
-    newly = ~refused & (jumps | walks.any(axis=1))
-    why = np.where(jumps, JUMPED, WALKED_OFF)
+    by_unit = walks.any(axis=1)
+    newly = ~refused & (jumps | by_unit | disagrees.any(axis=1))
+    why = np.where(jumps, JUMPED, np.where(by_unit, WALKED_OFF, DISAGREES))
     denied = np.where(newly, why, np.where(refused & ~returns, tip.denied, NOTHING))
-    state = _of_the_oldest(tip, walks, newly & ~jumps)
+    state = _of_the_oldest(tip, walks, newly & ~jumps & by_unit)
+    state = _walked_back(replace(tip, state=state), walked, disagrees, newly & ~jumps & ~by_unit)
     tip = compared(replace(tip, state=state, denied=denied, agreed=agreed), worst, old, unseen, trusted)
+    tip = forgotten(replace(tip, told_from_mps=_told_from(tip, bound)), returns)
     accepted = np.flatnonzero(denied == NOTHING)
     if not len(accepted):
         return tip
@@ -72,19 +90,38 @@ def judged(tip: Tip, place: Floats, late_s: Floats, held: Bools, unseen: Floats,
 
 def _square(off: Floats, faster: Floats, tip: Tip) -> Floats:
     """Squared Mahalanobis distances (n, h) of level positions and velocities (n, h, 2); a velocity that was not told is none."""
+    has_velocity = ~np.isnan(faster[..., :1])
+    both = np.concatenate([off, np.where(has_velocity, faster, 0.0)], axis=-1)
+    scatter = _expected(tip, has_velocity)
+    return np.asarray(np.sum(both * np.linalg.solve(scatter, both[..., None])[..., 0], axis=-1))
+
+
+def _expected(tip: Tip, has_velocity: Bools) -> Floats:
+    """What good level positions and velocities are off by from hypotheses: the covariance (n, h, 4, 4)."""
     rows = np.array([0, 1, 3, 4])
     known = tip.state.covariance[..., rows[:, None], rows]
-    has_velocity = ~np.isnan(faster[..., :1])
+    place, speed = (tip.scatter_m2 + WANDERS_M**2)[:, None, None], (tip.scatter_mps2 + WANDERS_MPS**2)[:, None, None]
+    shape = (*known.shape[:2], 2)
     noise = np.concatenate(
-        [
-            np.broadcast_to((tip.scatter_m2 + WANDERS_M**2)[:, None, None], off.shape),
-            np.where(has_velocity, (tip.scatter_mps2 + WANDERS_MPS**2)[:, None, None], 1e6) * np.ones_like(off),
-        ],
+        [np.broadcast_to(place, shape), np.where(has_velocity, speed, 1e6) * np.ones(shape)],
         axis=-1,
     )
-    both = np.concatenate([off, np.where(has_velocity, faster, 0.0)], axis=-1)
-    scatter = known + noise[..., None] * np.eye(4)
-    return np.asarray(np.sum(both * np.linalg.solve(scatter, both[..., None])[..., 0], axis=-1))
+    return np.asarray(known + noise[..., None] * np.eye(4))
+
+
+def _told_from(tip: Tip, bound: Floats) -> Floats:
+    """The slowest walk (n,), m/s, with velocities to match, that the oldest hypothesis would deny, squares beyond a bound (n,)
+    given; as before where that is young.
+    """
+    rows = np.arange(len(tip))
+    oldest = 1 + np.argmin(tip.seeded[:, 1:], axis=1)
+    age_s = (tip.cell - tip.seeded[rows, oldest]) * CELL_S
+    walk = np.concatenate([age_s[:, None, None] * np.eye(2), np.broadcast_to(np.eye(2), (len(tip), 2, 2))], axis=1)
+    expected = _expected(tip, np.ones((len(tip), 1, 1), np.bool_))[rows, oldest]
+    per = np.swapaxes(walk, -1, -2) @ np.linalg.solve(expected, walk)
+    mean = 0.5 * (per[:, 0, 0] + per[:, 1, 1])
+    least = mean - np.hypot(0.5 * (per[:, 0, 0] - per[:, 1, 1]), per[:, 0, 1])
+    return np.where(age_s >= TELLS_AT_S, np.sqrt(bound / np.maximum(least, 1e-12)), tip.told_from_mps)
 
 
 def _of_the_oldest(tip: Tip, walks: Bools, which: Bools) -> Reckoning:
@@ -94,15 +131,28 @@ def _of_the_oldest(tip: Tip, walks: Bools, which: Bools) -> Reckoning:
         return tip.state
     age = np.where(walks[rows], tip.seeded[rows, 1:], np.iinfo(np.int64).max)
     best = 1 + np.argmin(age, axis=1)
-    sure = with_each(lambda one: one[rows, best], tip.state)
+    return with_rows(tip.state, rows, with_each(lambda one: one[rows, best], tip.state))
 
-    def changed(whole: NDArray[Any], part: NDArray[Any]) -> NDArray[Any]:
-        whole = whole.copy()
-        for one in range(1 + BRANCHES):
-            whole[rows, one] = part
-        return whole
 
-    return with_each(changed, tip.state, sure)
+def _walked_back(tip: Tip, walked: Floats, which_say: Bools, which: Bools) -> Reckoning:
+    """Where positions have walked from their velocities, all go on from the first hypothesis without that way, as far as
+    the oldest of those that say so knows it.
+    """
+    rows = np.flatnonzero(which)
+    if not len(rows):
+        return tip.state
+    age = np.where(which_say[rows], tip.seeded[rows, 1:], np.iinfo(np.int64).max)
+    best = np.argmin(age, axis=1)
+    back = np.zeros((len(rows), 3))
+    back[:, :2] = -walked[rows, best]
+    late_s = (tip.cell[rows] - tip.seeded[rows, 1 + best]) * CELL_S
+    main = with_each(lambda one: one[rows, 0], tip.state)
+    motion = main.motion
+    latitude, longitude, _ = displaced(motion.latitude_rad, motion.longitude_rad, motion.height_m, back)
+    covariance = main.covariance.copy()
+    covariance[:, (0, 1), (0, 1)] += ((OFF_MPS * late_s) ** 2)[:, None]
+    main = replace(main, motion=replace(motion, latitude_rad=latitude, longitude_rad=longitude), covariance=covariance)
+    return with_rows(tip.state, rows, main)
 
 
 def _worked_in(tip: Tip, off: Floats, faster: Floats, place: Floats) -> Tip:

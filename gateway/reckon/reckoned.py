@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from gateway.estimators import dead_reckoning as dr
 from gateway.estimators.inertial import displaced
 from gateway.reckon.cells import CELL_NS, SECOND
-from gateway.reckon.judging import TRUSTED_AFTER, WANDERS_M
+from gateway.reckon.judging import TRUSTED_AFTER
+from gateway.reckon.proving import is_proved
 from gateway.reckon.tip import Tip
+from gateway.reckon.walking import WANDERS_M
 
 Floats = NDArray[np.float64]
 
@@ -36,6 +38,7 @@ class Reckoned:
     scatter_m: float  # of its position source, level, an axis
     denied: int  # why its position source is refused: `tip.NOTHING`, JUMPED, WALKED_OFF
     heard_at: int  # when a position was worked in last
+    told_from_mps: float  # the slowest walk with velocities to match that it denies; NaN = not known
     trusted: bool  # it has learnt its own errors
     ahead_s: float  # since what vehicles told last
 
@@ -51,7 +54,11 @@ class Reckoned:
             north, east = self.wind_mps.tolist()
             readings.append(("wind found, m/s", math.hypot(north, east)))
             readings.append(("wind found from, degrees", math.degrees(math.atan2(-east, -north)) % 360.0))
-        denied = ("believed", "refused: they jumped", "refused: they walk off")[self.denied]
+        if not math.isnan(self.told_from_mps):
+            readings.append(("tells walks from, m/s", self.told_from_mps))
+        denied = ("believed", "refused: they jumped", "refused: they walk off", "refused: they leave their velocity")[
+            self.denied
+        ]
         return tuple(readings), (("positions", denied),)
 
 
@@ -80,6 +87,7 @@ def reckoned(aircraft: str, tip: Tip, at: int, denied: int) -> Reckoned:
         math.sqrt(float(tip.scatter_m2[0])),
         denied,
         int(tip.heard[0]) * CELL_NS,
+        told_from_mps(tip),
         bool(tip.cell[0] - tip.began[0] >= TRUSTED_AFTER),
         ahead_s,
     )
@@ -89,3 +97,8 @@ def wind_mps(tip: Tip) -> Floats:
     """The wind that a vehicle has found, north and east (2,), where the air moves to; NaN = not known."""
     is_known = tip.state.covariance[0, 0, dr.WIND, dr.WIND].max() < WIND_KNOWN_MPS**2
     return tip.state.wind_mps[0, 0] if is_known else np.full(2, math.nan)
+
+
+def told_from_mps(tip: Tip) -> float:
+    """The slowest walk with velocities to match that is denied, once the vehicle has proved how sure it is; NaN = not known."""
+    return float(tip.told_from_mps[0]) if is_proved(tip)[0] else math.nan

@@ -83,6 +83,12 @@ def begun(at: int, place: Floats, attitude: Floats, settings: DeadReckoning, by:
         np.zeros(1, np.int64),
         np.zeros(1),
         np.zeros(1),
+        np.array([math.nan]),
+        np.full((1, 5), math.nan),
+        one,
+        np.zeros((1, HYPOTHESES, 2)),
+        np.zeros(1, np.int64),
+        np.zeros(1),
     )
 
 
@@ -164,9 +170,10 @@ def _through(tip: Tip, told: Block, kinds: Kinds, by: By, cell: int, unit: Unit,
         tip = replace(tip, began=tip.cell)
     if end % SEEDED_EVERY == 0:
         which = 1 + end // SEEDED_EVERY % (HYPOTHESES - 1)
-        seeded = tip.seeded.copy()
-        seeded[:, which] = end
-        tip = replace(tip, state=with_hypothesis(tip.state, which, hypothesis(tip.state, 0)), seeded=seeded)
+        seeded, walked = tip.seeded.copy(), tip.walked_m.copy()
+        seeded[:, which], walked[:, which] = end, walked[:, 0]
+        state = with_hypothesis(tip.state, which, hypothesis(tip.state, 0))
+        tip = replace(tip, state=state, seeded=seeded, walked_m=walked)
     return tip
 
 

@@ -24,6 +24,7 @@ Ints = NDArray[np.int64]
 
 LASTS_S = 30.0  # the errors of an autopilot's attitude, of an airspeed and of an altitude: what is told is that old
 ATTITUDE_EVERY = 10  # cells
+HULL_MPS = 1.5  # to the side, for half a minute: currents, leeway, and what a boat skids by in a bend
 SLOWEST_AIR_MPS = 8.0  # below it an airspeed tells nothing
 _LOOSE_M = 1e6
 
@@ -40,7 +41,8 @@ def tied(state: Reckoning, told: Block, kinds: Kinds, cell: int, settings: DeadR
     slip = settings.slip_mps
     state = of_some(state, rows, lambda some: dr.with_wheels(some, np.array([slip, slip]))[0])
     rows = np.flatnonzero(kinds.hull & kinds.unit)
-    state = of_some(state, rows, lambda some: dr.with_wheels(some, np.array([5.0 * slip, 5.0 * slip]))[0])
+    skids = HULL_MPS * math.sqrt(2.0 * LASTS_S / (BLOCK * CELL_S))
+    state = of_some(state, rows, lambda some: dr.with_wheels(some, np.array([skids, _LOOSE_M]))[0])
     rows = np.flatnonzero(kinds.wings & (told.airspeed > SLOWEST_AIR_MPS))
     if len(rows):
         height = state.motion.height_m[rows]

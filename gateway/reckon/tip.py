@@ -23,7 +23,7 @@ Bools = NDArray[np.bool_]
 BRANCHES = 4
 SEEDED_EVERY = 50  # cells
 HYPOTHESES = 1 + BRANCHES
-NOTHING, JUMPED, WALKED_OFF = range(3)
+NOTHING, JUMPED, WALKED_OFF, DISAGREES = range(4)  # the last: with the velocity beside it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +44,12 @@ class Tip:
     proved: Ints  # (n,) comparisons of good positions with the oldest hypothesis
     times: Floats  # (n,) the mean square that they were off by, of what is expected
     rough: Floats  # (n,) the power of what is not told of the forces between samples, in these
+    told_from_mps: Floats  # (n,) the slowest walk with velocities to match that would be denied; NaN = not known
+    last: Floats  # (n, 5) the last position: latitude, longitude; velocity north, east; how long before its cell's end it was
+    placed: Ints  # (n,) the cell of it
+    walked_m: Floats  # (n, HYPOTHESES, 2) how far positions had walked from their velocities: now, and when each was split off
+    followed: Ints  # (n,) positions without a pause
+    strays: Floats  # (n,) the mean square that they walk by, of what is expected
 
     def __len__(self) -> int:
         return len(self.cell)
@@ -88,7 +94,8 @@ def spread(state: Reckoning) -> Reckoning:
 
 def split_anew(tip: Tip, cell: int) -> Tip:
     """The same with every hypothesis split off from the first one now."""
-    return replace(tip, state=spread(hypothesis(tip.state, 0)), seeded=np.full_like(tip.seeded, cell))
+    state, walked = spread(hypothesis(tip.state, 0)), np.zeros_like(tip.walked_m)
+    return replace(tip, state=state, seeded=np.full_like(tip.seeded, cell), walked_m=walked)
 
 
 def hypothesis(state: Reckoning, which: int) -> Reckoning:
@@ -102,6 +109,17 @@ def with_hypothesis(state: Reckoning, which: int, one: Reckoning) -> Reckoning:
     def changed(whole: NDArray[Any], part: NDArray[Any]) -> NDArray[Any]:
         whole = whole.copy()
         whole[:, which] = part
+        return whole
+
+    return with_each(changed, state, one)
+
+
+def with_rows(state: Reckoning, rows: Ints, one: Reckoning) -> Reckoning:
+    """The same with all hypotheses of some vehicles those of one (rows, ...)."""
+
+    def changed(whole: NDArray[Any], part: NDArray[Any]) -> NDArray[Any]:
+        whole = whole.copy()
+        whole[rows] = part[:, None]
         return whole
 
     return with_each(changed, state, one)

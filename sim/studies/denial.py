@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from gateway.estimators.inertial import between, displaced
 from gateway.reckon.cells import CELL_NS, cells, covered_until
-from gateway.reckon.judging import WANDERS_M
 from gateway.reckon.kinds import Kinds
 from gateway.reckon.running import begun, run
 from gateway.reckon.tip import NOTHING, Tip
 from gateway.reckon.told import PLACE, WIDTHS, Series, Told
+from gateway.reckon.walking import WANDERS_M
 from gateway.settings import DeadReckoning
 from sim.inertial import Ride, aeroplane, car
 from sim.studies import Progress, Table, silent
