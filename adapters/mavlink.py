@@ -55,6 +55,7 @@ _READERS: MappingProxyType[int, Reader] = MappingProxyType(
         air.WIND_COV: air.wind_components,
         missions.HOME_POSITION: missions.home,
         missions.MISSION_CURRENT: missions.current_item,
+        missions.PARAM_VALUE: missions.parameter,
         simulated.SIM_STATE: simulated.sim_state,
         simulated.SIMSTATE: simulated.simstate,
     }

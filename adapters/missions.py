@@ -3,6 +3,8 @@
     HOME_POSITION (242)     latitude, longitude degE7, altitude mm above mean sea level: point 0 of the plan
     MISSION_CURRENT (42)    seq: the item it goes to; total; mission_state 1 no mission, 2 not begun, 5 complete;
                             mission_mode 2 suspended: then it does not go there, and what was declared is withdrawn
+    PARAM_VALUE (22)        of ArduPilot's aeroplanes RTL_RADIUS, or if that is 0 WP_LOITER_RAD, m, negative to the left, and
+                            RTL_ALTITUDE, m above home (once ALT_HOLD_RTL, cm): how it circles at home, where a station asks
 
 MISSION_CURRENT comes each second: an intent is told when it has changed. Item 0 of ArduPilot is home and no goal.
 """
@@ -13,6 +15,7 @@ from collections import Counter
 
 from adapters.mavlink_frames import fields
 from adapters.moments import Moments, Observations
+from adapters.plans import RETURN_PARAMETERS
 from adapters.positions import is_altitude
 from adapters.roles import PX4
 from adapters.vehicle import Vehicle
@@ -21,6 +24,7 @@ from gateway.observation import FlightPlan, Intent
 
 HOME_POSITION, _read_home = fields("HOME_POSITION", "latitude", "longitude", "altitude")
 MISSION_CURRENT, _read_current = fields("MISSION_CURRENT", "seq", "mission_state", "mission_mode")
+PARAM_VALUE, _read_parameter = fields("PARAM_VALUE", "param_value", "param_id")
 
 _STATES = {1: "no mission", 2: "not begun", 3: "active", 4: "paused", 5: "complete"}
 _IDLE_STATES = frozenset((1, 2, 5))
@@ -38,6 +42,18 @@ def home(
     if not changed:
         return ()
     vehicle.words["home"] = f"{latitude / 1e7:.6f}, {longitude / 1e7:.6f}, {altitude_mm / 1000:.1f} m"
+    valid_at, _ = moments.at_receipt(component, received_at)
+    return (FlightPlan(vehicle.name, valid_at, received_at, vehicle.plan.points()),)
+
+
+def parameter(
+    moments: Moments, component: Component, vehicle: Vehicle, payload: bytes, received_at: int, counters: Counter[str]
+) -> Observations:
+    """PARAM_VALUE: what it says of the way home."""
+    value, told = _read_parameter(payload)
+    name = told.split(b"\0")[0].decode("ascii", "replace")
+    if name not in RETURN_PARAMETERS or not vehicle.plan.hear_return(name, value):
+        return ()
     valid_at, _ = moments.at_receipt(component, received_at)
     return (FlightPlan(vehicle.name, valid_at, received_at, vehicle.plan.points()),)
 

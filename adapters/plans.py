@@ -14,7 +14,7 @@ PX4 it is the first point. An item that is marked 2 or 3 is a guided target or a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from adapters.mavlink_frames import fields
@@ -37,6 +37,13 @@ _LAST_NAVIGATION, _REGION_OF_INTEREST = 95, 80
 _MSL_FRAMES, _HOME_FRAMES, _TERRAIN_FRAMES = (0, 5), (3, 6), (10, 11)
 _ALL_TYPES = 255
 _HIGHEST_M = 100_000.0
+RETURN_RADIUS, LOITER_RADIUS, RETURN_HEIGHT, RETURN_HEIGHT_CM = (
+    "RTL_RADIUS",
+    "WP_LOITER_RAD",
+    "RTL_ALTITUDE",
+    "ALT_HOLD_RTL",
+)
+RETURN_PARAMETERS = frozenset((RETURN_RADIUS, LOITER_RADIUS, RETURN_HEIGHT, RETURN_HEIGHT_CM))
 
 
 def plan_point(
@@ -112,6 +119,7 @@ class PlanBook:
     next_item: int | None = None  # where it says that it goes
     _home: PlanPoint | None = None
     _points: dict[int, PlanPoint] = field(default_factory=dict)
+    _returns: dict[str, float] = field(default_factory=dict)  # parameters of the way home
     _heard: set[int] = field(default_factory=set)
     _expected: int | None = None
     _before: dict[int, PlanPoint] | None = None  # what it had when a station began to send it another
@@ -140,9 +148,16 @@ class PlanBook:
         self._home = home
         return self._is_news()
 
+    def hear_return(self, name: str, value: float) -> bool:
+        """One of `RETURN_PARAMETERS`; whether the plan has changed."""
+        if not abs(value) <= _HIGHEST_M:  # false for NaN too
+            return False
+        self._returns[name] = value
+        return self._is_news()
+
     def points(self) -> tuple[PlanPoint, ...]:
         """The plan, home first, in the order of the sequence numbers."""
-        home = () if self._home is None else (self._home,)
+        home = () if self._home is None else (self._with_return(self._home),)
         return (*home, *(self._points[number] for number in sorted(self._points)))
 
     def point(self, sequence: int) -> PlanPoint | None:
@@ -174,6 +189,13 @@ class PlanBook:
             return "none known"
         text = f"{number} point{'' if number == 1 else 's'}"
         return text if self.next_item is None else f"{text}, next {self.next_item}"
+
+    def _with_return(self, home: PlanPoint) -> PlanPoint:
+        """Home, and how wide and how high it is circled there; a radius of 0 is none, a height below 0 that which it has."""
+        told = self._returns
+        height = told.get(RETURN_HEIGHT, told.get(RETURN_HEIGHT_CM, -1.0) / 100.0)
+        radius = told.get(RETURN_RADIUS) or told.get(LOITER_RADIUS) or None
+        return replace(home, radius_m=radius, altitude_above_home_m=height if height >= 0.0 else None)
 
     def _hear_item(self, sequence: int, point: PlanPoint | None) -> None:
         if point is None:

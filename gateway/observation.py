@@ -180,7 +180,8 @@ class FlightPlan:
 class PlanPoint:
     """One point of a flight plan. The altitude is above mean sea level when `altitude_msl_m`, else above home.
 
-    A point of kind "loiter" is flown round at `radius_m`, positive to the right, for at least so many `turns`.
+    A point of kind "loiter" is flown round at `radius_m`, positive to the right, for at least so many `turns`. Home has its own
+    altitude above mean sea level, and above home and round it those at which the vehicle circles when it has returned.
     """
 
     sequence: int

@@ -96,11 +96,17 @@ def goals_of(told: Told | None, site: Site, frame: RunwayFrame, separation_m: fl
         names[slot], goals.planned[slot] = f"{points[slot].kind} {points[slot].sequence}", True
         circles[slot] = points[slot].kind == "loiter"
     if told.plan is not None and told.plan.points and told.plan.points[0].kind == "home":
-        enu = _place(told.plan.points[0], home_m, separation_m, site, frame)
+        home = told.plan.points[0]
+        enu = _place(home, home_m, separation_m, site, frame)
         route[HOME, 0], names[HOME] = enu[:2], HOME_NAME
         if told.status is not None and returning(told.status):
-            circles[HOME] = rounds[HOME] = circles_at_home(told.status)
+            circles[HOME] = circles_at_home(told.status)
+            rounds[HOME] = circles[HOME] and home.radius_m is None
             goals.lands[HOME, 0] = not circles[HOME]
+            if circles[HOME]:
+                up[HOME, 0] = _place(replace(home, altitude_msl_m=None), home_m, separation_m, site, frame)[2]
+            if circles[HOME] and home.radius_m is not None:
+                goals.radius[HOME, 0], goals.least[HOME, 0] = -home.radius_m, math.inf
     chosen = _declared(declared, points, names)
     if chosen == DECLARED and declared is not None:
         place = _declared_place(declared, separation_m, site, frame)

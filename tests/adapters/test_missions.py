@@ -41,6 +41,23 @@ def test_the_landed_state_is_told_when_it_changes_and_with_each_heartbeat(plane:
     assert plane.counter("landed state unknown") == 1
 
 
+def test_how_it_circles_at_home_is_known_once_a_station_asks_for_its_parameters(plane: Any) -> None:
+    """Its own radius for returning, or if that is 0 that of all circles; a height below 0 is none; NaN and others say nothing."""
+    plane.one("HOME_POSITION", latitude=310_000_000, longitude=1_040_000_000, altitude=500_000)
+
+    def told(name: str, value: float) -> Any:
+        found = plane.say("PARAM_VALUE", param_id=name.encode(), param_value=value, param_count=900, param_index=1)
+        return (found[0].points[0].radius_m, found[0].points[0].altitude_above_home_m) if found else None
+
+    assert told("RTL_RADIUS", 0.0) is None
+    assert told("WP_LOITER_RAD", 60.0) == (60.0, None)
+    assert told("RTL_ALTITUDE", 100.0) == (60.0, 100.0)
+    assert told("RTL_RADIUS", -80.0) == (-80.0, 100.0)
+    assert told("RTL_ALTITUDE", -1.0) == (-80.0, None)
+    assert told("RTL_RADIUS", math.nan) is None
+    assert told("ARSPD_USE", 1.0) is None
+
+
 def test_home_is_shown(plane: Any) -> None:
     plan = plane.one("HOME_POSITION", latitude=310_000_000, longitude=1_040_000_000, altitude=500_000)
     assert isinstance(plan, FlightPlan)

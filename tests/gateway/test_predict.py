@@ -208,6 +208,19 @@ def test_who_is_in_the_mode_that_flies_home_goes_home() -> None:
     assert "home" not in {row[2] for row in found if row[3] == "declared" and not 20.0 <= row[0] <= 41.0}
 
 
+def test_who_flies_home_circles_there_as_wide_and_as_high_as_its_parameters_say() -> None:
+    """Home is 2 km ahead, its circle 600 m wide, 200 m above home: in a minute it is on it, 100 m higher than now."""
+    told = home_and((9000.0, 3000.0), home=(0.0, 5000.0))
+    told = replace(
+        told, points=(replace(told.points[0], radius_m=600.0, altitude_above_home_m=200.0), *told.points[1:])
+    )
+    pictures = run([told, goes_to(1), in_mode(11, 1.0), *northward(50)])
+    east, north = ahead(pictures)
+    assert math.hypot(east, north - 5000.0) == pytest.approx(600.0, rel=0.05)
+    heights = np.concatenate([one.predict.height_m[one.predict.horizon_s == 60.0] for one in pictures])
+    assert heights[-1] - heights[0] == pytest.approx(100.0, abs=3.0)
+
+
 def test_who_is_beside_the_line_of_its_plan_comes_back_to_it() -> None:
     """The line to its point leads eastward, 600 m north of it, it flies at it: in 60 s it is on it, not on a way from here."""
     told = [plan((-3000.0, 3000.0), (9000.0, 3000.0)), goes_to(2)]
