@@ -20,7 +20,7 @@ from gateway.predict.told import Said, Tellings
 from gateway.settings import Site
 
 FEW = 20  # tracks that are predicted at the whole second, when much else is done; parts of more have their own instants
-TOGETHER = 150  # tracks of a part
+TOGETHER = 200  # tracks of a part
 NEVER = 1 << 62
 
 

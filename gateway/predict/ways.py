@@ -180,7 +180,7 @@ class Case:
     covariance: Floats
 
 
-def cases_at(ways: Ways, rows: Ints, at: Ints) -> tuple[tuple[Case, Case], Floats]:
+def cases_at(ways: Ways, rows: Ints, at: Ints) -> tuple[tuple[Case, ...], Floats]:
     """What some rows (k,) may do until instants (k,) ns, by the nearest of the grid, and upright variances (k,) then.
 
     Who flies straight goes on so, or turns some time. Both together have the sigmas that are foretold, but who goes on is
@@ -190,16 +190,20 @@ def cases_at(ways: Ways, rows: Ints, at: Ints) -> tuple[tuple[Case, Case], Float
     since_s = (at - ways.made[rows]) / SECOND
     near = np.clip(np.rint(since_s / STEP_S), 0, last).astype(np.int64)
     along, across, course = (column[rows, near] for column in (ways.along, ways.across, ways.course))
-    speed, here = ways.straight_mps[rows], ways.along[rows, 0] ** 2
-    goes_on = np.where(np.isnan(speed), 0.0, np.exp(-np.maximum(since_s, 0.0) / STRAIGHT_S))
-    cases = []
-    wanders = here + SLOWS * speed * speed * since_s**3, here + (KEEPS_RAD * speed * since_s) ** 2
-    squares = along * along, across * across
-    straight = [np.fmin(small, square) for small, square in zip(wanders, squares, strict=True)]
+    upright, squares, speed = ways.upright[rows, near] ** 2, (along * along, across * across), ways.straight_mps[rows]
+    if np.isnan(speed).all():
+        return (Case(np.ones(len(rows)), _turned(*squares, course)),), upright
+    goes_on, here = (
+        np.where(np.isnan(speed), 0.0, np.exp(-np.maximum(since_s, 0.0) / STRAIGHT_S)),
+        ways.along[rows, 0] ** 2,
+    )
+    late, aside = SLOWS * speed * speed * since_s**3, (KEEPS_RAD * speed * since_s) ** 2
+    straight = [np.fmin(here + wanders, square) for wanders, square in zip((late, aside), squares, strict=True)]
     others = [(square - goes_on * small) / (1.0 - goes_on) for square, small in zip(squares, straight, strict=True)]
-    for probability, (first, second) in ((goes_on, straight), (1.0 - goes_on, others)):
-        cases.append(Case(probability, _turned(first, second, course)))
-    return (cases[0], cases[1]), ways.upright[rows, near] ** 2
+    return (
+        Case(goes_on, _turned(*straight, course)),
+        Case(1.0 - goes_on, _turned(*others, course)),
+    ), upright
 
 
 def _turned(along: Floats, across: Floats, course: Floats) -> Floats:
