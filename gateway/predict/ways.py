@@ -192,7 +192,7 @@ def cases_at(ways: Ways, rows: Ints, at: Ints) -> tuple[tuple[Case, ...], Floats
     along, across, course = (column[rows, near] for column in (ways.along, ways.across, ways.course))
     upright, squares, speed = ways.upright[rows, near] ** 2, (along * along, across * across), ways.straight_mps[rows]
     if np.isnan(speed).all():
-        return (Case(np.ones(len(rows)), _turned(*squares, course)),), upright
+        return (Case(np.ones(len(rows)), _turned(squares[0], squares[1], course)),), upright
     goes_on, here = (
         np.where(np.isnan(speed), 0.0, np.exp(-np.maximum(since_s, 0.0) / STRAIGHT_S)),
         ways.along[rows, 0] ** 2,
@@ -201,8 +201,8 @@ def cases_at(ways: Ways, rows: Ints, at: Ints) -> tuple[tuple[Case, ...], Floats
     straight = [np.fmin(here + wanders, square) for wanders, square in zip((late, aside), squares, strict=True)]
     others = [(square - goes_on * small) / (1.0 - goes_on) for square, small in zip(squares, straight, strict=True)]
     return (
-        Case(goes_on, _turned(*straight, course)),
-        Case(1.0 - goes_on, _turned(*others, course)),
+        Case(goes_on, _turned(straight[0], straight[1], course)),
+        Case(1.0 - goes_on, _turned(others[0], others[1], course)),
     ), upright
 
 
