@@ -1,8 +1,9 @@
 """What became of earlier predictions: by how much sigmas were too small or too large for each track, and are so from now on.
 
 Of each of the first horizons a few predictions are kept until they come due. Then the track itself tells how far off they were,
-in sigmas along and across; the mean of that, against what it would be for a Gaussian, faded and begun with a share of "as they
-should be", scales the sigmas that follow. Predictions without a turn and such with one learn apart.
+in sigmas along and across; the mean of that, against what it would be for a Gaussian, faded, scales the sigmas that follow.
+Predictions without a turn and such with one learn apart. It begins as half of what the horizon before has learnt, which comes due
+sooner, the first as "as they should be": who is off by more than others in ten seconds is so in a minute too.
 
 Arrays are over n tracks. A track knows only what it has seen itself, at instants of its own predictions: how arrivals fall into
 ticks changes nothing.
@@ -25,11 +26,13 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-PRIOR = 2.0  # horizons' worth of predictions that were as far off as they should be
+PRIOR = 1.0  # horizons' worth of predictions that were as far off as is thought to begin with
 MEMORY = 20.0  # horizons after which what was learnt has faded to a third
-AT_MOST = 3.0  # sigmas: one prediction that is off by more counts no more, or few would make all others' too large
+AT_MOST = (
+    3.0  # of the sigmas now: one prediction that is off by more counts no more, or few would make all others' too large
+)
 USUAL = 0.7971  # the mean size of a Gaussian's values of sigma 1 that count at most so much
-LEAST, MOST = 1.0 / 3.0, 3.0  # scales
+LEAST, MOST = 1.0 / 3.0, 10.0  # scales
 LEAST_SIGMA_M = 0.01
 FRESH_S = 2.0  # a track without a measurement for longer does not know where it is
 MOVING_MPS = 3.0  # slower, there is no course that a prediction could be off along or across
@@ -51,8 +54,9 @@ def learnt(minds: Minds, at: int, state: State, horizons_s: tuple[float, ...]) -
     worth = np.array([_every(one) / one for one in horizons_s[:LEARNT]])
     worth = np.concatenate([worth, np.zeros(LEARNT - len(worth))])
     slots = row, (foretold[:, 5] == 1.0).astype(np.int64), horizon
+    most = AT_MOST * _scale(minds.sigmas[row], minds.counted[row])[np.arange(len(row)), slots[1], horizon]
     sigmas, counted = np.zeros(minds.sigmas.shape), np.zeros(minds.counted.shape)
-    np.add.at(sigmas, slots, np.minimum(np.stack([along, across], axis=-1), AT_MOST))
+    np.add.at(sigmas, slots, np.minimum(np.stack([along, across], axis=-1), most))
     np.add.at(counted, slots, 1.0)
     sigmas, counted = sigmas * worth[:, None], counted * worth
     keep = np.exp(-counted / MEMORY)
@@ -66,11 +70,20 @@ def learnt(minds: Minds, at: int, state: State, horizons_s: tuple[float, ...]) -
 
 def scaled(minds: Minds, spread: Spread, turns: Bools) -> Spread:
     """Sigmas (n, h) as the tracks' own past says they are; `turns` (n, h) where the way or the aircraft turns."""
-    scale = (PRIOR * USUAL + minds.sigmas) / (PRIOR + minds.counted[..., None]) / USUAL
-    scale = np.clip(scale, LEAST, MOST)  # (n, 2, LEARNT, 2)
+    scale = _scale(minds.sigmas, minds.counted)
     slots = np.minimum(np.arange(turns.shape[1]), LEARNT - 1)
     each = np.where(turns[..., None], scale[:, 1][:, slots], scale[:, 0][:, slots])
     return Spread(spread.along * each[..., 0], spread.across * each[..., 1])
+
+
+def _scale(sigmas: Floats, counted: Floats) -> Floats:
+    """What sigmas are scaled by (n, 2, LEARNT, 2), of `Minds.sigmas` and `Minds.counted`."""
+    scale, begins = np.empty(sigmas.shape), np.ones((len(sigmas), 2, 2))
+    for horizon in range(LEARNT):
+        known = PRIOR * begins + sigmas[:, :, horizon] / USUAL
+        scale[:, :, horizon] = known / (PRIOR + counted[:, :, horizon, None])
+        begins = np.sqrt(scale[:, :, horizon])
+    return np.clip(scale, LEAST, MOST)
 
 
 def kept(

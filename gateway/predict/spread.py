@@ -25,17 +25,18 @@ ALONG_POINTS, ENDS_LANDED, ENDS_ROUND, ROUND_A_POINT, BY_MODEL = range(5)
 # How early or late it is on a way along points, seconds: a share of the time, more for each radian of turns on the way and for
 # each radian that it turned lately, and where it is to fly slower. Beside the way: autopilots wander about a line, swing over
 # after a turn, and more while they are in one. What turns bring is a share of the time in which a turn goes through a radian.
-CRUISE, LATE_A_TURN, LATE_IN_TURN, LATE_SLOWER, LATE_LANDED_S = 0.008, 0.106, 0.08, 0.05, 3.0
+CRUISE, LATE_A_TURN, LATE_IN_TURN, LATE_SLOWER, LATE_LANDED_S = 0.009, 0.056, 0.14, 0.05, 6.0
 # along and across, shares of speed, past the end of the way: it has landed, it circles, nobody knows
 SOON_S = 6.0  # before a way's end: it flares, or turns aside onto a circle
 ROUND_S = 2.5  # half of the time in which it flies the radius of a circle that nobody says
-RESTS, ROUNDS, GOES_ANYWHERE = (0.2, 0.0), (0.25, 0.25), (1.2, 0.7)
-WANDERS_S, WANDERS_FOR_S, WANDERS_A_TURN = 0.036, 40.0, 0.004
+RESTS, ROUNDS, GOES_ANYWHERE = (0.4, 0.0), (0.25, 0.25), (1.2, 0.7)
+WANDERS_S, WANDERS_FOR_S, WANDERS_A_TURN = 0.05, 40.0, 0.009
+GUSTS_ASIDE_S = 1.5  # for so long the root mean square of gusts carries it aside before it comes back
 ROUND_WANDERS_S = 0.3
-SWINGS, SWINGS_NOW, SWINGS_FOR_S = 0.11, 0.5, 4.0
-ACCELERATES_S = 1.7  # who changes its speed goes on doing so for this long
+SWINGS, SWINGS_NOW, SWINGS_FOR_S = 0.115, 0.5, 2.0
+ACCELERATES_S = 2.7  # who changes its speed goes on doing so for this long
 # of the mean square of gusts: how far off the speed that is kept is, and for how many seconds what comes lasts, twice
-CRUISE_OFF, GUST_LASTS_S = 0.3, 10.0
+CRUISE_OFF, GUST_LASTS_S = 1.2, 11.0
 ON_LINE_RAD = 0.3  # who has turned by more flies along a line between two points
 SETTLES_S = 14.0  # after a turn
 EARLY_S, EARLY = 2.0, 0.06  # how much earlier and later the way is looked at
@@ -104,7 +105,7 @@ def spread(
     soon = t > _ends_s(whole, t)[:, None] - SOON_S
     late = late + (LATE_SLOWER * whole.slower_s[:, :h]) ** 2 + np.where(lands & soon, LATE_LANDED_S**2, 0.0)
     late = late + ends_along * ends_along
-    wanders = WANDERS_S**2 * np.where(turned > ON_LINE_RAD, 1.0, 2.0 * (1.0 - np.exp(-t / WANDERS_FOR_S)))
+    wanders = WANDERS_S**2 * np.where(turned > ON_LINE_RAD, 1.0, 1.0 - np.exp(-t / WANDERS_FOR_S))
     swings = (SWINGS * lately_s) ** 2 + (SWINGS_NOW * in_turn_s) ** 2 * np.exp(-t / SWINGS_FOR_S)
     at_circle = ROUND_WANDERS_S**2 * heads_round[:, None]
     beside_s = wanders + at_circle + swings + (WANDERS_A_TURN * turns_s) ** 2 + ends_across * ends_across
@@ -118,9 +119,8 @@ def spread(
     )
     by_points = speed * speed * late + _of_wind(now, whole, t, wind_mps) + GUST_LASTS_S * now.gusts[:, None] * t
     along = place + gains * t * t + np.where(by_model, 0.0, by_points) + unknown / 6.0
-    drifts = np.where(
-        by_model, (now.speed_sigma[:, None] * t) ** 2, speed * speed * beside_s + _to_side(whole, t) * late
-    )
+    off_line = speed * speed * beside_s + _to_side(whole, t) * late + GUSTS_ASIDE_S**2 * now.gusts[:, None]
+    drifts = np.where(by_model, (now.speed_sigma[:, None] * t) ** 2, off_line)
     return Spread(np.sqrt(along), np.sqrt(place + drifts + unknown / 3.0))
 
 

@@ -11,6 +11,7 @@ STUDIES = (
     "alpha-beta-gamma",
     "rmimm",
     "prediction",
+    "sigmas",
     "conflicts",
     "consistency",
     "noise",

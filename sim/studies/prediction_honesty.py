@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from gateway.align import SECOND
@@ -41,19 +43,27 @@ NOTES = (
 def scored(count: int, seed: int) -> list[Score]:
     """The scores of all predictions of some missions."""
     flown = missions(count, SECONDS, seed)
-    heard = sorted((one for mission in flown for one in mission.said), key=lambda one: one.received_at)
+    said = sorted((one for mission in flown for one in mission.said), key=lambda one: one.received_at)
+    heard = [Heard(one.received_at + 4 * place, (one,)) for place, one in enumerate(said)]
+    return scores_of_all(joined(list(held(heard, {mission.aircraft: _way(mission) for mission in flown}).values())))
+
+
+def scores_of_all(found: Errors) -> list[Score]:
+    """By horizon, of all predictions."""
+    return [one for one in scores(found) if one.group == "all"]
+
+
+def held(heard: Sequence[Heard], ways: Mapping[str, Way]) -> dict[str, Errors]:
+    """What a gateway at the demo's site that hears this foretells of each aircraft, held against the way that it came."""
     state = initial(DEMO_SITE, Options(horizons_s=HORIZONS_S))
     made: list[Predicted] = []
     aircraft: dict[int, str] = {}
-    arrivals = [Heard(one.received_at + 4 * place, (one,)) for place, one in enumerate(heard)]
-    for first in range(0, len(arrivals), 500):
-        state, picture = step(state, arrivals[first : first + 500])
+    for first in range(0, len(heard), 500):
+        state, picture = step(state, heard[first : first + 500])
         made.append(picture.predict)
         known = zip(picture.fuse.track.tolist(), picture.fuse.aircraft, strict=True)
         aircraft.update((track, name) for track, name in known if name is not None)
-    ways = {mission.aircraft: _way(mission) for mission in flown}
-    parts = [_errors(made, track, ways[name]) for track, name in aircraft.items()]
-    return [one for one in scores(joined(parts)) if one.group == "all"]
+    return {name: _errors(made, track, ways[name]) for track, name in aircraft.items()}
 
 
 def _way(mission: Mission) -> Way:

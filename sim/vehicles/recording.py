@@ -46,7 +46,7 @@ def write_flight(
     folder = make_folder(parent, session_name(start_ns, "flight"))
     record = Record(__version__, command, Options(), start_ns, site, "the site file" if site else "", ended="done")
     recorder = Recorder(folder, record)
-    stations = [_Station(speaker) for speaker in speakers]
+    stations = [Station(speaker) for speaker in speakers]
     for number, speaker in enumerate(speakers, 1):
         recorder.add(Source(number, "mavlink", f"mavlink-{speaker.encoder.system}", "simulated vehicle"))
     last, told_s, rows = start_ns, 0.0, list[Truth]()
@@ -69,7 +69,7 @@ def write_flight(
 
 
 @dataclass(slots=True)
-class _Station:
+class Station:
     """A ground station that reads a vehicle's mission once, as real ones do: recordings hold missions because of that."""
 
     speaker: Speaker

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gateway.predict.hindsight import LEAST, MOST, kept, learnt, scaled
+from gateway.predict.hindsight import LEAST, MOST, USUAL, kept, learnt, scaled
 from gateway.predict.minds import LEARNT, Minds
 from gateway.predict.spread import Spread
 from gateway.predict.states import State
@@ -69,7 +69,7 @@ def test_what_is_said_too_small_or_large_is_learnt(times: float) -> None:
 
 
 def test_the_scale_is_bounded() -> None:
-    """Whatever comes, sigmas are neither more than thrice nor less than a third of what is derived."""
+    """Whatever comes, sigmas are neither more than ten times nor less than a third of what is derived."""
     assert (flown(900, 1.0, 1000.0).along <= MOST).all()
     assert (flown(900, 1000.0, 0.0).along >= LEAST).all()
 
@@ -86,3 +86,13 @@ def test_ways_with_and_without_a_turn_learn_apart() -> None:
     some = Spread(np.ones((1, 2)), np.ones((1, 2)))
     assert (scaled(minds, some, np.zeros((1, 2), dtype=np.bool_)).along > 1.5).all()
     assert scaled(minds, some, np.ones((1, 2), dtype=np.bool_)).along[0].tolist() == [1.0, 1.0]
+
+
+def test_a_long_horizon_begins_with_half_of_what_a_short_one_has_learnt() -> None:
+    """Four times too far off in ten seconds: sigmas for thirty, of which nothing has come due, are doubled."""
+    minds = replace(Minds.empty(1), sigmas=np.zeros((1, 2, LEARNT, 2)), counted=np.zeros((1, 2, LEARNT)))
+    minds.counted[:, 0, 0] = 1e6
+    minds.sigmas[:, 0, 0] = 4.0 * USUAL * 1e6
+    found = scaled(minds, Spread(np.ones((1, 2)), np.ones((1, 2))), np.zeros((1, 2), dtype=np.bool_))
+    assert found.along[0] == pytest.approx([4.0, 2.0], rel=1e-3)
+    assert found.across[0] == pytest.approx([4.0, 2.0], rel=1e-3)
