@@ -223,7 +223,7 @@ def _muted(playback: Playback, mutes: list[str] | None) -> tuple[Muted, tuple[tu
 def _rebuilt(playback: Playback, how: How, around: Around, quiet: bool) -> dict[str, list[Sortie]]:
     """Every sortie of every aircraft. Raises FileError, FolderError, RunError where there is nothing to rebuild."""
     from gateway.cli.progress import progressing
-    from gateway.offline.reconstruction import Unplaced, reconstructed
+    from gateway.offline.reconstruction import Unplaced, Unreachable, reconstructed
     from gateway.runtime.flights import radar_tracks, radar_views, read_recorded
 
     with progressing("reading", show=not quiet) as tell:
@@ -247,6 +247,8 @@ def _rebuilt(playback: Playback, how: How, around: Around, quiet: bool) -> dict[
                 tell(len(found) / len(flyable))
     except Unplaced as error:
         raise UsageError(f"{str(error).capitalize()}: tell it with --lift-off LAT,LON.") from error
+    except Unreachable as error:
+        raise UsageError(str(error)) from error
     return found
 
 

@@ -109,7 +109,7 @@ class Tied:
     def spread(self, time_s: Floats) -> Floats:
         """Covariance (m, 2, 2) of the place at times (m,), m2: linear between eight instants of each knot's time."""
         knots = self.knots
-        fine = knots.first_s + knots.step_s / 8.0 * np.arange(8 * knots.count + 1)
+        fine = knots.first_s + knots.step_s / 8.0 * np.arange(8 * knots.count + 1, dtype=np.float64)
         spread = _spread(knots.carried(fine), self.covariance).reshape(-1, 4)
         return np.stack([np.interp(time_s, fine, one) for one in spread.T], axis=-1).reshape(-1, 2, 2)
 

@@ -238,7 +238,7 @@ class _Search:
         squares = np.full(len(rows.time_s), np.inf)
         squares[close] = distance
         np.minimum.at(least, self._looks[near], squares[near])
-        return near[(rows.number[near] > 0) | (squares[near] <= least[self._looks[near]])]
+        return np.asarray(near[(rows.number[near] > 0) | (squares[near] <= least[self._looks[near]])])
 
     def _known_well(self, tied: Tied) -> Ints:
         sigma = np.interp(self._rows.time_s, self._way.time_s, tied.sigma_m)

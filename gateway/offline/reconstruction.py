@@ -43,8 +43,15 @@ TAKE_OFF_SHARE, LANDING_SHARE = (
 )  # of the cruising speed: what most fixed-wing aircraft lift off and touch down at
 
 
+_STRONGEST_MPS = 100.0  # no wind that small aircraft fly in is stronger, and few jet streams
+
+
 class Unplaced(ValueError):
     """A path should be closed on a place, and nothing tells where it began; the message is part of a sentence."""
+
+
+class Unreachable(ValueError):
+    """A path should end at a place to which no wind would have carried it; the message is a sentence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,6 +183,8 @@ def _sortie(flown: Flown, first: int, end: int, take_off_mps: float, beside: _Be
         height = through_air[:, 2]
     knows_its_end = landed and (took_off or how.close_on != "lift-off")
     target = _target(how.close_on, lift_off) if knows_its_end else None
+    if target is not None:
+        _check_reachable(target, through_air[-1, :2], float(time_s[-1]))
     fixes = fixes_of(places, time, lift_off, how.muted) if how.fixes and lift_off is not None else None
     positions = 0 if fixes is None else len(fixes.time_s) // 2
     evidence = None if beside.felt is None else evidence_of(beside.felt, time_s, velocity[:, :2], lift_off)
@@ -222,6 +231,16 @@ def _target(close_on: Place | str, lift_off: Place | None) -> Floats | None:
     if lift_off is None:
         raise Unplaced("no position tells where it lifted off, so a path cannot be closed on a place")
     return np.asarray(level_m(np.array([close_on[0]]), np.array([close_on[1]]), lift_off)[0])
+
+
+def _check_reachable(target_m: Floats, ended_m: Floats, lasted_s: float) -> None:
+    """Raises Unreachable."""
+    wind = float(np.linalg.norm(target_m - ended_m)) / lasted_s
+    if wind > _STRONGEST_MPS:
+        raise Unreachable(
+            f"To end {np.linalg.norm(target_m) / 1000.0:.0f} km from where it lifted off, it would have been carried by "
+            f"a wind of {wind:.0f} m/s: --close-on or --lift-off is not the place."
+        )
 
 
 def _heading_bias(

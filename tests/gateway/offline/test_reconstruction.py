@@ -11,7 +11,7 @@ import pytest
 from gateway.estimators.flight_path import standard_pressure
 from gateway.observation import AirData, Attitude, GpsReport, Observation
 from gateway.offline.parameters import Parameters
-from gateway.offline.reconstruction import How, Sortie, Unplaced, reconstructed
+from gateway.offline.reconstruction import How, Sortie, Unplaced, Unreachable, reconstructed
 
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND
@@ -110,6 +110,13 @@ def test_without_positions_the_path_is_in_metres_from_lift_off() -> None:
     told = _only(_gathered(positions=False), How(lift_off=LIFT_OFF, close_on=_end()))
     assert told.geodetic_deg is not None
     np.testing.assert_allclose(np.radians(told.geodetic_deg[-1]), _end(), atol=1e-8)
+
+
+def test_a_place_that_no_wind_reaches_is_refused() -> None:
+    """A degree further north after 400 s would be a wind of 278 m/s."""
+    end = _end()
+    with pytest.raises(Unreachable, match="wind of 27[0-9] m/s"):
+        reconstructed(_gathered(), How(close_on=(end[0] + math.radians(1.0), end[1])))
 
 
 def test_without_pressure_and_altitude_the_height_is_that_of_the_pitch() -> None:
