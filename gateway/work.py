@@ -168,8 +168,10 @@ class Work(Associating):
         """A source that scatters otherwise than stated, said once; of aircraft only the first are named."""
         named = sum(", GPS of " in about for about in self.said)
         if ", GPS of " in found.topic and found.topic not in self.said and named >= NAMED_AT_MOST:
-            self.once("more aircraft's positions scatter otherwise than is stated of them: they are not named")
+            self.once("of more aircraft positions or velocities are not as stated: they are not named")
         else:
+            if found.topic not in self.said:
+                self.count("noises and velocities that are not as stated")
             self.once(found.text, topic=found.topic)
 
     def _start_again(self, now: int) -> None:

@@ -30,7 +30,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 SURE = 12.0  # evidence that is sure of a single noise; of many, the logarithm of their number more
-SUSPECT = 4.0  # evidence against a velocity from which on what its positions scatter by is not judged
+# Evidence against a velocity (a leg is 2.5 at most) from which on what its aircraft scatters by is not judged, and forgotten.
+SUSPECT, WRONG = 1.0, 4.0
 LASTING = 0.3  # a receiver whose reports scatter by less than this share of what is stated has errors that last
 TOGETHER_AT_LEAST, TOGETHER_ENOUGH = 3, 4.0 * ENOUGH  # aircraft, and squares of theirs, which are many soon
 MANY, WAIT_NS = 64, 5 * SECOND  # measurements that are judged at once, or all that came in so long
@@ -165,13 +166,15 @@ class Consistency:
             one: events[row].measure for one, row in zip(group.tolist(), rows.event[new[place]].tolist(), strict=True)
         }
         rows = rows.of(np.isin(rows.group, group))
-        names = [measure.aircraft for measure in by_group.values() if isinstance(measure, Fix)]
-        known = self.displacements.after(rows, names)
-        suspected, sure = mismatches(known, SUSPECT), SURE + math.log(2.0 * max(len(known.aircraft), 1))
-        for one in told:
-            if suspected:
-                one.evidence[[key[0].removeprefix(OF) in suspected for key in one.keys], ::3] = -math.inf
-        wrong = mismatches(known, sure) if suspected else {}
+        aircraft = [measure.aircraft for measure in by_group.values() if isinstance(measure, Fix)]
+        known = self.displacements.after(rows, aircraft)
+        suspected = mismatches(known, SUSPECT)
+        if not suspected:
+            return replace(self, displacements=known, contradicted=frozenset()), []
+        for names, level in ((suspected, 0.0), (mismatches(known, WRONG), -math.inf)):
+            for one in told:
+                one.evidence[[key[0].removeprefix(OF) in names for key in one.keys], ::3] = level
+        wrong = mismatches(known, SURE + math.log(2.0 * len(known.aircraft)))
         after = replace(self, displacements=known, contradicted=frozenset(wrong))
         return after, [finding for findings in wrong.values() for finding in findings]
 
