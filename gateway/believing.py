@@ -28,7 +28,7 @@ class Believing(Making):
         for observation in arrival.observations:
             if isinstance(observation, VehicleStatus):
                 self.reckoners = self.reckoners.of_type(observation.aircraft, observation.vehicle_type)
-            elif reads(observation):
+            if reads(observation):
                 told.append(observation)
         if told:
             # Many arrivals told together come at the last one's time, within its second: offsets are whole seconds.
@@ -37,12 +37,14 @@ class Believing(Making):
 
     def _believed(self, fix: Fix, report: GpsReport) -> Fix | None:
         """A position as fuse takes it: as it is, eased where it comes back, or None where inertial data deny it."""
+        if not self.reckoners.denies(fix.aircraft, fix.at) and self._is_frozen(report, fix.at):
+            return None
         expected = None
         if fix.aircraft in self.reckoners.by_aircraft:
             self.reckoners = self.reckoners.placed(fix.aircraft, fix.at, self._place_of(fix, report))
             expected = self.reckoners.of(fix.aircraft, fix.at)
         if expected is None:
-            return None if self._is_frozen(report, fix.at) else fix
+            return fix
         if self.site.dead_reckoning.refuses and (expected.denied != NOTHING or self._is_denied(fix, expected)):
             if expected.denied == NOTHING:
                 self.reckoners = self.reckoners.suspecting(fix.aircraft)

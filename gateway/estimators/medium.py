@@ -19,23 +19,22 @@ from gateway.estimators.inertial import Motion, displaced
 Floats = NDArray[np.float64]
 
 _NORTH_EAST, _LEVEL = slice(0, 2), slice(3, 5)
-_FEWEST_DRAG_PER_S = 0.0
 
 
 def turned_through(state: Reckoning, turned_rad: Floats, interval_s: float) -> Reckoning:
     """A while later, in which noses have turned by so much (...,), clockwise, and the ways through the medium with them."""
     cosine, sine = np.cos(turned_rad), np.sin(turned_rad)
     kept = np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
-    return _kept(state, kept, interval_s)
+    return _kept(state, kept, interval_s, by_drag=False)
 
 
 def dragged(state: Reckoning, interval_s: float) -> Reckoning:
     """A while later, in which drag has slowed the ways through the air."""
-    kept = np.exp(-np.maximum(state.drag_per_s, _FEWEST_DRAG_PER_S) * interval_s)
-    return _kept(state, kept[..., None, None] * np.eye(2), interval_s)
+    kept = np.exp(-np.maximum(state.drag_per_s, 0.0) * interval_s)
+    return _kept(state, kept[..., None, None] * np.eye(2), interval_s, by_drag=True)
 
 
-def _kept(state: Reckoning, kept: Floats, interval_s: float) -> Reckoning:
+def _kept(state: Reckoning, kept: Floats, interval_s: float, *, by_drag: bool) -> Reckoning:
     """A while later, of which level ways through the medium are what a matrix (..., 2, 2) makes of them."""
     motion, wind = state.motion, state.wind_mps
     through = motion.velocity_mps[..., :2] - wind
@@ -48,7 +47,7 @@ def _kept(state: Reckoning, kept: Floats, interval_s: float) -> Reckoning:
     lost = kept - np.eye(2)
     across[..., _LEVEL, _LEVEL], across[..., _LEVEL, WIND] = kept, -lost
     across[..., _NORTH_EAST, _LEVEL], across[..., _NORTH_EAST, WIND] = 0.5 * interval_s * lost, -0.5 * interval_s * lost
-    if len(state.one) > DRAG:
+    if by_drag and len(state.one) > DRAG:
         across[..., _LEVEL, DRAG] = -interval_s * after
         across[..., _NORTH_EAST, DRAG] = -0.5 * interval_s**2 * after
     return replace(

@@ -119,6 +119,11 @@ class Reckoners:
         reckoner = self.by_aircraft.get(aircraft)
         return NOTHING if reckoner is None or reckoner.tip is None else int(reckoner.tip.denied[0])
 
+    def denies(self, aircraft: str, at: int) -> bool:
+        """Whether dead reckoning judges a vehicle's positions by itself."""
+        found = self.of(aircraft, at)
+        return found is not None and (found.trusted or self.by(aircraft) in (By.UNIT, By.AIRSPEED))
+
     def by(self, aircraft: str) -> By:
         """What carries a vehicle on."""
         reckoner = self.by_aircraft.get(aircraft)
