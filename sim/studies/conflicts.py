@@ -1,13 +1,14 @@
 """The conflict probe: how many staged conflicts it finds, how long before separation is lost, and how often it is wrong.
 
-The whole gateway, from the wires' bytes on, over scenes: `conflicts`, pairs that lose their separation in six ways, and
-`traffic`. What is lost and what is not is told by the true ways. Nobody has told a plan: all is foretold from how they fly.
+The whole gateway, from the wires' bytes on, over scenes: `conflicts`, pairs that lose their separation in six ways, `traffic`,
+with and without a radar, and four times as much of it, in which many lose it. What is lost and what is not is told by the true
+ways. Nobody has told a plan: all is foretold from how they fly.
 Source: 000, what the prediction is for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -30,7 +31,10 @@ Pair = tuple[str, str]
 START = 1_790_000_000 * SECOND
 AHEAD_S = 60.0
 LATER_S = 60.0  # a conflict that was told is true if separation is lost within the time looked ahead, and so much more
-QUIET_S = 3600.0
+QUIET = "duration_s=3600", "aircraft=60"
+CROWDED = "duration_s=900", "aircraft=60", "radars=0"
+EDGES = (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.01)
+EVERY_S = 20  # of a conflict that goes on its probability is looked at
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +45,10 @@ class Outcome:
     lead_s: Floats  # (k,)
     told: int
     wrong: tuple[str, ...]
-    probability: Floats  # (m,) as it was first told, of each conflict
+    first: Floats  # (m,) the probability as it was first told, of each conflict
     came: NDArray[np.bool_]  # (m,)
+    later: Floats  # (l,) and each 20 s after, as long as separation is not lost
+    came_later: NDArray[np.bool_]  # (l,)
     hours: float
 
     @property
@@ -52,21 +58,35 @@ class Outcome:
 
 
 def run(runs: int = 5, seed: int = 1, *, rrd: Path | None = None, progress: Progress = silent) -> Study:
-    """Staged conflicts, twenty a run, and an hour of `traffic` a run, each with one radar. There are no figures to draw."""
-    staged, quiet = [], []
-    for index in range(runs):
-        progress("staged conflicts", index / runs)
-        staged.append(outcome(build_scene("conflicts", start_ns=START, seed=seed + index)))
-        progress("traffic", (index + 0.4) / runs)
-        changes = (f"duration_s={QUIET_S}", "aircraft=60")
-        quiet.append(outcome(build_scene("traffic", start_ns=START, seed=seed + index, changes=changes)))
-    figures = {
-        "found, %": 100.0 * float(np.mean([one.found for one in staged])),
-        "false alarms an hour, traffic": sum(len(one.wrong) for one in quiet) / sum(one.hours for one in quiet),
+    """A run: twenty staged conflicts, an hour of `traffic` with a radar and one without, and a crowded quarter of an hour.
+
+    There are no figures to draw.
+    """
+    kinds: dict[str, tuple[str, tuple[str, ...]]] = {
+        "conflicts": ("conflicts", ()),
+        "traffic": ("traffic", QUIET),
+        "traffic, no radar": ("traffic", (*QUIET, "radars=0")),
+        "traffic, crowded": ("traffic", CROWDED),
     }
-    notes = tuple(f"false alarm in {text}" for one in (*staged, *quiet) for text in one.wrong)
-    tables = (_found(staged), _alarms({"conflicts": staged, "traffic": quiet}, notes), _honest([*staged, *quiet]))
-    return Study("conflicts", runs, seed, tables, figures)
+    found: dict[str, list[Outcome]] = {name: [] for name in kinds}
+    for index in range(runs):
+        for place, (name, (scene, changes)) in enumerate(kinds.items()):
+            progress(name, (index + 0.25 * place) / runs)
+            found[name].append(outcome(build_scene(scene, start_ns=START, seed=seed + index, changes=changes)))
+    figures = {"found, %": 100.0 * float(np.mean([one.found for one in found["conflicts"]]))} | {
+        f"false alarms an hour, {name}": sum(len(one.wrong) for one in many) / sum(one.hours for one in many)
+        for name, many in found.items()
+        if name != "conflicts"
+    }
+    notes = tuple(
+        f"false alarm in {text}"
+        for name, many in found.items()
+        if "crowded" not in name
+        for one in many
+        for text in one.wrong
+    )
+    tables = (_found(found["conflicts"]), _alarms(found, notes), *(_honest(name, many) for name, many in found.items()))
+    return Study("conflicts", runs, seed, tuple(one for one in tables if one.rows), figures)
 
 
 def outcome(scene: Scene) -> Outcome:
@@ -74,14 +94,26 @@ def outcome(scene: Scene) -> Outcome:
     separation = scene.site.separation
     lost = losses(scene, separation)
     first: dict[Pair, float] = {}
-    wrong, probability, came = [], [], []
-    for at_s, pair, chance in alarms(pictures(scene, "apply")):
-        first.setdefault(pair, at_s)
+    wrong, probability, came, later = [], [], [], []
+    until_s = (
+        scene.duration_s - separation.look_ahead_s - LATER_S
+    )  # who is told after that nobody knows what becomes of
+    told_at: dict[Pair, float] = {}
+    for at_s, pair, state, chance in alarms(pictures(scene, "apply")):
         true = [t for t in lost.get(pair, ()) if at_s - 10.0 <= t <= at_s + separation.look_ahead_s + LATER_S]
-        probability.append(chance)
-        came.append(bool(true))
-        if not true:
-            wrong.append(f"{scene.name}, seed {scene.seed}: {pair[0]} and {pair[1]} at {at_s:.0f} s, {chance:.2f}")
+        if state == "found":
+            first.setdefault(pair, at_s)
+            told_at[pair] = at_s
+            probability.append(chance)
+            came.append(bool(true))
+            if not true:
+                wrong.append(f"{scene.name}, seed {scene.seed}: {pair[0]} and {pair[1]} at {at_s:.0f} s, {chance:.2f}")
+        elif (
+            at_s < until_s
+            and not any(t <= at_s for t in true)
+            and round(at_s - told_at.setdefault(pair, at_s)) % EVERY_S == 0
+        ):
+            later.append((chance, bool(true)))
     kinds = {aircraft.name: aircraft.kind for aircraft in scene.aircraft}
     leads = [times[0] - first.get(pair, np.nan) for pair, times in lost.items()]
     return Outcome(
@@ -91,12 +123,14 @@ def outcome(scene: Scene) -> Outcome:
         tuple(wrong),
         np.array(probability),
         np.array(came, dtype=np.bool_),
+        np.array([chance for chance, _ in later]),
+        np.array([true for _, true in later], dtype=np.bool_),
         scene.duration_s / 3600.0,
     )
 
 
-def alarms(seen: Iterable[Picture]) -> Iterable[tuple[float, Pair, float]]:
-    """When each conflict was told, s after the start, of which aircraft, with what probability."""
+def alarms(seen: Iterable[Picture]) -> Iterable[tuple[float, Pair, str, float]]:
+    """Each second of each conflict, s after the start: of which aircraft, whether it is new or goes on, with what probability."""
     names: dict[int, str] = {}
     for picture in seen:
         names |= {
@@ -106,9 +140,9 @@ def alarms(seen: Iterable[Picture]) -> Iterable[tuple[float, Pair, float]]:
         }
         found = picture.predict.conflicts
         for row, state in enumerate(found.state):
-            if state == "found":
+            if state != "over":
                 one, other = sorted(names.get(track, f"track {track}") for track in found.pair[row])
-                yield (int(found.time[row]) - START) / SECOND, (one, other), float(found.probability[row])
+                yield (int(found.time[row]) - START) / SECOND, (one, other), state, float(found.probability[row])
 
 
 def losses(scene: Scene, separation: Separation) -> dict[Pair, list[float]]:
@@ -149,7 +183,7 @@ def _found(staged: Sequence[Outcome]) -> Table:
     return Table("losses of separation", columns, tuple(rows))
 
 
-def _alarms(outcomes: dict[str, Sequence[Outcome]], notes: tuple[str, ...]) -> Table:
+def _alarms(outcomes: Mapping[str, Sequence[Outcome]], notes: tuple[str, ...]) -> Table:
     rows = []
     for name, many in outcomes.items():
         hours = sum(one.hours for one in many)
@@ -159,14 +193,17 @@ def _alarms(outcomes: dict[str, Sequence[Outcome]], notes: tuple[str, ...]) -> T
     return Table("false alarms", columns, tuple(rows), notes)
 
 
-def _honest(many: Sequence[Outcome]) -> Table:
-    probability, came = np.concatenate([one.probability for one in many]), np.concatenate([one.came for one in many])
-    edges = (0.0, 0.1, 0.2, 0.4, 1.0)
+def _honest(name: str, many: Sequence[Outcome]) -> Table:
+    """How many of the conflicts came true that were told with a probability, at first and while they went on."""
+    first, came = np.concatenate([one.first for one in many]), np.concatenate([one.came for one in many])
+    later, came_later = np.concatenate([one.later for one in many]), np.concatenate([one.came_later for one in many])
     rows: list[tuple[str | float, ...]] = []
-    for low, high in pairwise(edges):
-        mine = (probability >= low) & (probability < high)
-        if mine.any():
-            rows.append((f"{low:g} to {high:g}", int(mine.sum()), 100.0 * float(came[mine].mean())))
-    return Table(
-        "what came of conflicts, by the probability first told", ("probability", "told", "lost, %"), tuple(rows)
-    )
+    for low, high in pairwise(EDGES):
+        row: list[str | float] = [f"{low:g} to {min(high, 1.0):g}"]
+        for probability, lost in ((first, came), (later, came_later)):
+            mine = (probability >= low) & (probability < high)
+            row += [int(mine.sum()), 100.0 * float(lost[mine].mean()) if mine.any() else float("nan")]
+        if row[1] or row[3]:
+            rows.append(tuple(row))
+    columns = ("probability", "first told", "lost, %", "going on, each 20 s", "lost, %")
+    return Table(f"what came of conflicts, {name}", columns, tuple(rows))
