@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,9 @@ class Seen:
     known: Known
     used: int
     of: int
+    place_m: Floats = field(
+        default_factory=lambda: np.zeros((0, 3))
+    )  # (k, 3) those with range and azimuth, from lift-off
     tracks: tuple[str, ...] = ()
     doubt: str | None = None
 
@@ -104,7 +107,7 @@ def seen(way: Way, views: Sequence[View], told: Collection[str], tie: Tie) -> Se
             doubt = f"it may be either of what the radar saw as {names}: close it on where it touched down (--close-on LAT,LON)"
             return Seen(Known.none(), 0, len(rows.time_s), doubt=doubt)
     tracks = sorted({rows.names[row] for row in np.flatnonzero(best.taken & (rows.number > 0)).tolist()})
-    return Seen(best.known, int(best.taken.sum()), len(rows.time_s), tuple(tracks))
+    return Seen(best.known, int(best.taken.sum()), len(rows.time_s), search.drawn(best.taken), tuple(tracks))
 
 
 def _together(way: Way, views: Sequence[View]) -> _Rows:
@@ -133,6 +136,11 @@ class _Search:
         second = np.floor(rows.time_s).astype(np.int64)
         self._looks = np.unique(np.stack([rows.view, second], axis=-1), axis=0, return_inverse=True)[1].reshape(-1)
         self._of = np.unique(np.array(rows.names), return_inverse=True)[1]
+
+    def drawn(self, taken: Bools) -> Floats:
+        """Where some plots are, east, north and up of lift-off (k, 3) m, those of them that have a range and an azimuth."""
+        places = np.concatenate([self._located, self._above[:, None]], axis=1)[taken]
+        return places[np.isfinite(places).all(axis=1)]
 
     def starts(self, told: Collection[str]) -> list[Bools]:
         """Rows that may be one aircraft's: of a numbered track, or unnumbered ones that ask for the same wind."""

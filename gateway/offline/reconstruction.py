@@ -37,12 +37,8 @@ from gateway.offline.sightings import View, seen_within
 
 Floats = NDArray[np.float64]
 
-TAKE_OFF_SHARE, LANDING_SHARE = (
-    0.6,
-    0.45,
-)  # of the cruising speed: what most fixed-wing aircraft lift off and touch down at
-
-
+# Of the cruising speed: what most fixed-wing aircraft lift off and touch down at.
+TAKE_OFF_SHARE, LANDING_SHARE = 0.6, 0.45
 _STRONGEST_MPS = 100.0  # no wind that small aircraft fly in is stronger, and few jet streams
 
 

@@ -54,7 +54,7 @@ def _blueprint(flights: Mapping[str, Sequence[Sortie]]) -> rrb.Blueprint:
         )
     ]
     space = rrb.Spatial3DView(
-        origin="/flight", name="Flight: through the air (grey), over the ground (red), reported (orange)"
+        origin="/flight", name="Flight: through the air (grey), over the ground (red), reported (orange), radar (blue)"
     )
     return rrb.Blueprint(
         rrb.Horizontal(
@@ -86,6 +86,9 @@ def _sortie(recording: rr.RecordingStream, name: str, sortie: Sortie, offset_m: 
     for kind, points, colour, width in lines:
         drawn = rr.LineStrips3D([points], colors=[colour], radii=style.points(width))
         recording.log(entity("flight", name, kind), drawn, static=True)
+    if sortie.radar is not None and len(sortie.radar.place_m):
+        plots = rr.Points3D(sortie.radar.place_m + offset_m, colors=style.RADAR, radii=style.points(1.5))
+        recording.log(entity("flight", name, "radar plots"), plots, static=True)
     lat_lon = sortie.geodetic_deg
     if lat_lon is not None:
         way = rr.GeoLineStrings(lat_lon=[lat_lon], colors=[style.FUSED], radii=style.points(2.0))

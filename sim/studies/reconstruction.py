@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gateway.estimators import flight_path as paths
 from gateway.estimators.tied_path import Known, tied
 from sim.studies import Progress, Study, Table, silent
+from sim.studies.reconstruction_wind import table as windy_table
 
 Floats = NDArray[np.float64]
 
@@ -140,6 +141,8 @@ def run(runs: int = 50, seed: int = 1, *, rrd: Path | None = None, progress: Pro
     tables.append(_sorties(runs, seed, figures))
     progress("what closing does not see", 0.7)
     tables.append(_unseen(runs, seed, figures))
+    progress("accelerations", 0.8)
+    tables.append(windy_table(runs, seed, figures))
     if rrd is not None:
         from sim.studies.reconstruction_figures import draw
 

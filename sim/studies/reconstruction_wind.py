@@ -85,16 +85,17 @@ def table(runs: int, seed: int, figures: dict[str, float]) -> Table:
         (0.0, "is the same all the while"),
         (WANDERS_MPS_PER_SQRT_S, "wanders, 5 m/s in ten minutes"),
     ):
-        for accelerations in (False, True):
-            shares, inside = [], []
-            for number in range(runs):
-                flown = windy(seed + number, wanders)
-                sortie, off = rebuilt(flown, accelerations=accelerations)
-                shares.append(100.0 * math.sqrt(float(np.mean(off**2))) / sortie.length_m)
-                inside.append(float(np.mean(off <= 3.0 * sortie.sigma_m + 1.0)))
-            by = "with accelerations" if accelerations else "one constant wind"
-            figures[f"wind {what}, {by}"] = float(np.median(shares))
-            rows.append((what, by, float(np.median(shares)), max(shares), 100.0 * float(np.mean(inside))))
+        shares: dict[str, list[float]] = {"one constant wind": [], "accelerations": []}
+        inside: dict[str, list[float]] = {name: [] for name in shares}
+        for number in range(runs):
+            flown = windy(seed + number, wanders)
+            for name in shares:
+                sortie, off = rebuilt(flown, accelerations=name == "accelerations")
+                shares[name].append(100.0 * math.sqrt(float(np.mean(off**2))) / sortie.length_m)
+                inside[name].append(float(np.mean(off <= 3.0 * sortie.sigma_m + 1.0)))
+        for name, values in shares.items():
+            figures[f"wind {what}, {name}"] = float(np.median(values))
+            rows.append((what, name, float(np.median(values)), max(values), 100.0 * float(np.mean(inside[name]))))
     columns = ("the wind", "closed by", "median, %", "worst, %", "within 3 sigma, %")
     return Table("002-2: small aircraft, RMS distance of the path, % of its length", columns, tuple(rows))
 

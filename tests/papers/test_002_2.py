@@ -112,8 +112,8 @@ def test_a_landing_flight_of_sitl_is_rebuilt_within_a_hundredth_of_its_length(na
 @pytest.mark.skipif(not DATA.exists(), reason="the recordings are not beside the project")
 def test_a_real_flight_in_a_wind_that_doubles_is_rebuilt() -> None:
     """2 % are asked for. The wind grew from 4 to 8.5 m/s while 17 m/s were flown. Closed on lift-off with one constant wind
-    2.01 %, on where it touched down, 8 m beside it, 1.96 %; 0.9 % with its accelerometers, 1.2 % with what its autopilot had taken
-    off them put back; half of the constant wind's and less with three stretches of two seconds of positions.
+    2.01 %, on where it touched down, 8 m beside it, 1.96 %; 0.9 % with its accelerometers, 1.2 % with what its autopilot had
+    taken off them put back; half of the constant wind's and less with three stretches of two seconds of positions.
     """
     flown = loadmat(DATA / "fixed-wing-thor75.mat", squeeze_me=True, struct_as_record=False)["flight_data"]
     parameters = Parameters()

@@ -115,7 +115,7 @@ def test_without_positions_the_path_is_in_metres_from_lift_off() -> None:
 def test_a_place_that_no_wind_reaches_is_refused() -> None:
     """A degree further north after 400 s would be a wind of 278 m/s."""
     end = _end()
-    with pytest.raises(Unreachable, match="wind of 27[0-9] m/s"):
+    with pytest.raises(Unreachable, match=r"wind of 27[0-9] m/s"):
         reconstructed(_gathered(), How(close_on=(end[0] + math.radians(1.0), end[1])))
 
 
