@@ -1,5 +1,6 @@
 """Dead reckoning as the gateway runs it: how soon false positions are denied, that good ones are not, and whether its sigma is
-honest. Cars, aeroplanes, and vehicles of which nothing more is known, side by side. Source: 002-4, in the gateway.
+honest. Cars, aeroplanes, and vehicles of which nothing more is known, side by side; and copters and boats.
+Source: 002-4, in the gateway.
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ from gateway.reckon.tip import NOTHING, Tip
 from gateway.reckon.told import PLACE, WIDTHS, Series, Told
 from gateway.reckon.walking import WANDERS_M
 from gateway.settings import DeadReckoning
-from sim.inertial import Ride, aeroplane, car
+from sim.inertial import Errors, Ride, aeroplane, car
 from sim.studies import Progress, Table, silent
 from sim.told_rides import TENTH_NS, Falsified, Teller, honest
+from sim.unheld_rides import MOTOR, ROTORS, boat, copter
 
 Floats = NDArray[np.float64]
 Kinded = Sequence[tuple[int, Callable[[np.random.Generator, float], Ride]]]
@@ -33,6 +35,8 @@ OUTAGE_S = 60.0
 CLEAN_S = 900.0
 KINDS = ((10, car), (1, aeroplane), (2, aeroplane))  # the last tells inertial data only, as a copter does
 TELL_WALKS = KINDS[:2]
+UNHELD: Kinded = ((2, copter), (11, boat))
+SHAKEN = {copter: ROTORS, boat: MOTOR}
 
 
 def step(time_s: float) -> tuple[float, float, float, float]:
@@ -90,9 +94,8 @@ def ran(vehicles: int, seed: int, length_s: float, falsified: Falsified, kinds: 
     for number in range(vehicles):
         generator = np.random.default_rng([seed, number])
         vehicle_type, kind = kinds[number % len(kinds)]
-        tellers.append(
-            Teller.of(f"mavlink:{number + 1}", vehicle_type, kind(generator, length_s), generator, falsified)
-        )
+        ride, errors = kind(generator, length_s), SHAKEN.get(kind, Errors())
+        tellers.append(Teller.of(f"mavlink:{number + 1}", vehicle_type, ride, generator, falsified, errors))
     told = [told_of(one) for one in tellers]
     settings = DeadReckoning()
     first = [begun(int(one.places.at[9]), one.places.values[9], one.series[1].values[9], settings) for one in told]
@@ -155,17 +158,20 @@ def table(vehicles: int, seed: int, figures: dict[str, float], progress: Progres
         ("a step of 50 m", step, KINDS),
         ("2 m/s", walk, KINDS),
         ("2 m/s, velocities true", silent_walk, TELL_WALKS),
+        ("copters and boats: 2 m/s", walk, UNHELD),
+        ("copters and boats: 2 m/s, velocities true", silent_walk, UNHELD),
     ):
         progress(f"false positions: {name}", 0.9)
         after_s = ran(vehicles, seed, length_s, falsified, kinds).denied_after_s()
         figures |= {f"denied, {name}, median": float(np.median(after_s)), f"denied, {name}, last": max(after_s)}
         rows.append((name, vehicles, float(np.median(after_s)), max(after_s), sum(map(math.isinf, after_s))))
-    progress("good positions", 0.92)
-    clean = ran(2 * vehicles, seed + 1, CLEAN_S, honest)
-    denied = sum(not math.isinf(one) for one in clean.denied_after_s())
-    hours = 2 * vehicles * CLEAN_S / 3600.0
-    figures |= {"good, hours": hours, "good, denied": float(denied)}
-    rows.append((f"good, {hours:.0f} hours", 2 * vehicles, math.nan, math.nan, 2 * vehicles - denied))
+    for name, kinds in (("good", KINDS), ("copters and boats: good", UNHELD)):
+        progress(f"positions: {name}", 0.92)
+        clean = ran(2 * vehicles, seed + 1, CLEAN_S, honest, kinds)
+        denied = sum(not math.isinf(one) for one in clean.denied_after_s())
+        hours = 2 * vehicles * CLEAN_S / 3600.0
+        figures |= {f"{name}, hours": hours, f"{name}, denied": float(denied)}
+        rows.append((f"{name}, {hours:.0f} hours", 2 * vehicles, math.nan, math.nan, 2 * vehicles - denied))
     progress("no positions", 0.97)
     inside, end_m = ran(vehicles, seed, FALSE_FROM_S + OUTAGE_S, gone).inside()
     figures |= {"live, inside": 100.0 * inside, "live, at 60": end_m}

@@ -75,6 +75,12 @@ def test_on_a_real_flight_it_is_ten_times_better_than_constant_velocity(length_s
     assert found.inside.mean() >= 0.95
 
 
+def test_a_boat_in_waves_whose_position_leaves_its_velocity_is_refused() -> None:
+    """2 m/s within 12 s, by the velocity that is told beside it."""
+    (after_s,) = denial.ran(1, 31, 115.0, denial.silent_walk, denial.UNHELD[1:]).denied_after_s()
+    assert 4.0 <= after_s <= 12.0
+
+
 @pytest.mark.study
 def test_false_positions_are_denied_and_good_ones_are_not() -> None:
     """2 m/s within 20 s, 50 m at once, nothing in ten hours; three sigma hold in 99 % of the seconds without positions."""
@@ -84,5 +90,7 @@ def test_false_positions_are_denied_and_good_ones_are_not() -> None:
     assert figures["denied, 2 m/s, last"] <= 20.0
     assert figures["denied, 2 m/s, velocities true, last"] <= 20.0
     assert figures["good, hours"] >= 10.0
-    assert figures["good, denied"] == 0.0
+    assert figures["good, denied"] == figures["copters and boats: good, denied"] == 0.0
+    assert figures["denied, copters and boats: 2 m/s, median"] <= 1.0
+    assert figures["denied, copters and boats: 2 m/s, velocities true, last"] <= 20.0
     assert figures["live, inside"] >= 99.0
