@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix, Plot
 from gateway.fuse.displacement import Displacements
-from gateway.fuse.events import Event, Measure
-from gateway.fuse.evidence import ENOUGH, PLOT, REPORT, Finding, Part, changes_of, evidence, factors, summed
+from gateway.fuse.events import Event
+from gateway.fuse.evidence import ENOUGH, REPORT, Finding, factors, summed
 from gateway.fuse.mismatch import mismatches
-from gateway.fuse.scatter import Rows, left_of_plots, left_of_reports, rows_of
+from gateway.fuse.scatter import Rows, rows_of
+from gateway.fuse.telling import OF, Key, Told, told_by
 from gateway.settings import PositionSource, RadarSite
 
 Floats = NDArray[np.float64]
@@ -43,21 +44,8 @@ KEPT_NS = 30 * SECOND
 NOISES_AT_MOST = 8192  # the least lately heard are forgotten
 FORGOTTEN_NS = 3600 * SECOND  # and those that were not heard for so long
 
-Key = tuple[str, str, bool]  # source, part, whether the site file sets its noise
 Share = tuple[tuple[int, Event], ...]  # measurements, each with its track
-OF = "GPS of "  # an aircraft, as a source
 ALL = "GPS"  # the source that all aircraft together are
-
-
-@dataclass(frozen=True, slots=True)
-class Told:
-    """What new measurements tell of one part: of k noises, each with the last measurement, and its sums of `evidence`."""
-
-    part: Part
-    keys: list[Key]
-    measures: list[Measure]
-    sigma: Floats  # (k,) as stated
-    evidence: Floats  # (k, 9)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,7 +129,7 @@ class Consistency:
                 fresh = rows_of(new)
                 mine, others = (None, None) if known is None else known.parted(fresh.group)
                 rows, events = fresh.merged(mine), [event for _, event in new]
-                told += _told(rows, events, position, radars)
+                told += told_by(rows, events, position, radars)
                 if not is_plot:
                     after, found = self._displaced(rows, events, told)
                 latest = rows.latest(count, at - KEPT_NS)
@@ -235,37 +223,6 @@ def _shares(waiting: Share) -> list[Share]:
     return found
 
 
-def _told(rows: Rows, events: Sequence[Event], position: PositionSource, radars: Mapping[int, RadarSite]) -> list[Told]:
-    """What new measurements of one kind, reports or plots, tell of each of their parts; `rows` names them by number."""
-    is_plot = isinstance(events[0].measure, Plot)
-    left = left_of_plots(rows) if is_plot else left_of_reports(rows)
-    fresh = np.flatnonzero(rows.new)
-    if not len(fresh):
-        return []
-    left, sigma = left.of(fresh), rows.sigma[fresh]
-    new = [events[place] for place in rows.event[fresh].tolist()]
-    measures = [event.measure for event in new]
-    sources: dict[str | int, int] = {}
-    source = np.array([sources.setdefault(_source(measure), len(sources)) for measure in measures])
-    names = [f"radar {name}" if is_plot else f"{OF}{name}" for name in sources]
-    said = np.array([_said(name, position, radars) for name in sources])[source]
-    changes = changes_of(new, sigma.shape[1])
-    found = []
-    for number, part in enumerate(PLOT if is_plot else REPORT):
-        stated = sigma[:, part.first]
-        is_set = np.abs(stated - said[:, number]) <= 1e-9 * stated
-        weighed = evidence(left, changes, stated, part)
-        # The first measurements of a source tell nothing: no noise is watched yet.
-        some = np.flatnonzero(weighed.any(axis=1))
-        noise, place = np.unique(2 * source[some] + is_set[some], return_inverse=True)
-        last, total = np.zeros(len(noise), dtype=np.int64), np.zeros((len(noise), 9))
-        last[place] = some
-        np.add.at(total, place, weighed[some])
-        keys = [(names[one >> 1], part.name, bool(one & 1)) for one in noise.tolist()]
-        found.append(Told(part, keys, [measures[row] for row in last.tolist()], stated[last], total))
-    return found
-
-
 def _together(told: Told, noises: Mapping[Key, int], sums: Floats, factor: Floats, sure: float) -> Finding | None:
     """All aircraft whose noise the site file states as one source, but for those that are known to be off: into `sums`."""
     is_set = np.array([key[2] for key in told.keys], dtype=np.bool_)
@@ -277,21 +234,6 @@ def _together(told: Told, noises: Mapping[Key, int], sums: Floats, factor: Float
     sums[row] = summed(sums[row : row + 1], added)[0]
     (found,) = factors(sums[row : row + 1], sure, TOGETHER_ENOUGH).tolist()
     return _finding(told, int(is_set.argmax()), (ALL, told.part.name, True), found)
-
-
-def _source(measure: Measure) -> str | int:
-    """An aircraft, or a radar's number."""
-    return measure.aircraft if isinstance(measure, Fix) else measure.radar
-
-
-def _said(source: str | int, position: PositionSource, radars: Mapping[int, RadarSite]) -> tuple[float, ...]:
-    """The sigma of each part that the site file sets, NaN = none."""
-    if isinstance(source, str):
-        return position.sigma_m, position.velocity_sigma_mps
-    radar = radars.get(source)
-    if radar is None:
-        return math.nan, math.nan, math.nan
-    return radar.range_sigma_m, radar.azimuth_sigma_rad, radar.elevation_sigma_rad
 
 
 def _finding(told: Told, row: int, key: Key, factor: float) -> Finding | None:

@@ -13,9 +13,9 @@ import pytest
 
 from gateway.align import SECOND, Fix
 from gateway.fuse import consistency
-from gateway.fuse.consistency import NOISES_AT_MOST, PLOT, Consistency
+from gateway.fuse.consistency import NOISES_AT_MOST, Consistency
 from gateway.fuse.events import Event, Job, Measure
-from gateway.fuse.evidence import Finding, factors, summed
+from gateway.fuse.evidence import PLOT, Finding, factors, summed
 from gateway.fuse.filtering import run
 from gateway.fuse.scatter import RADARS, Rows, left_of_plots, left_of_reports, rows_of
 from gateway.fuse.weighting import Model
