@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from gateway.estimators.inertial import Motion, between, displaced, from_angles
 from gateway.reckon.cells import CELL_NS, SECOND_CELLS, cells, covered_until
 from gateway.reckon.flying import with_unit
-from gateway.reckon.judging import WANDERS_M
 from gateway.reckon.kinds import By, Kinds
 from gateway.reckon.running import run
 from gateway.reckon.tip import Tip
 from gateway.reckon.told import PLACE, WIDTHS, Series, Told
 from gateway.reckon.vehicle import first_tip
+from gateway.reckon.walking import WANDERS_M
 from gateway.settings import DeadReckoning
 
 Floats = NDArray[np.float64]
