@@ -87,7 +87,7 @@ def _sortie(recording: rr.RecordingStream, name: str, sortie: Sortie, offset_m: 
         drawn = rr.LineStrips3D([points], colors=[colour], radii=style.points(width))
         recording.log(entity("flight", name, kind), drawn, static=True)
     if sortie.radar is not None and len(sortie.radar.place_m):
-        plots = rr.Points3D(sortie.radar.place_m + offset_m, colors=style.RADAR, radii=style.points(1.5))
+        plots = rr.Points3D(sortie.radar.place_m + offset_m, colors=style.RADAR, radii=style.points(0.6))
         recording.log(entity("flight", name, "radar plots"), plots, static=True)
     lat_lon = sortie.geodetic_deg
     if lat_lon is not None:
