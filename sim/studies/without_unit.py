@@ -45,7 +45,7 @@ KNOWS_AFTER_S = 60.0  # it has learnt what it holds
 STATED = (1.5, 3.0, 0.5)  # sigmas of positions and velocities, where a stream tells none
 SETTINGS = DeadReckoning(refuses=False)
 STARTS = 1_700_000_000 * SECOND
-VEHICLES = 8  # of a kind
+VEHICLES = 3  # of a kind
 TYPES: dict[Craft, int] = {"copter": 2, "helicopter": 4, "ship": 11}  # MAV_TYPE
 SPEEDS_MPS = {"copter": (6.0, 14.0), "helicopter": (15.0, 30.0), "ship": (5.0, 10.0)}
 

@@ -12,6 +12,7 @@ def test_the_displays_numbers_are_what_they_are(plane: Any) -> None:
     air = plane.one("VFR_HUD", airspeed=22.5, groundspeed=25.0, alt=584.5, climb=-1.5, heading=90, throttle=50)
     assert isinstance(air, AirData)
     assert (air.airspeed_mps, air.groundspeed_mps, air.climb_mps, air.altitude_msl_m) == (22.5, 25.0, -1.5, 584.5)
+    assert air.compass_heading_rad == pytest.approx(math.pi / 2.0)
     assert air.wind_east_mps is air.static_pressure_pa is None
     assert air.received_at - air.valid_at <= 1_000_000_000, "it holds at its receipt"
     assert plane.health().readings["airspeed, m/s"] == 22.5
@@ -35,6 +36,10 @@ def test_a_number_that_cannot_be_is_left_out_and_counted(
     names = ("airspeed_mps", "groundspeed_mps", "climb_mps", "altitude_msl_m")
     assert [name for name in names if getattr(air, name) is None] == [field]
     assert plane.counter(reason) == 1
+
+
+def test_a_heading_that_nobody_knows_is_none(plane: Any) -> None:
+    assert plane.one("VFR_HUD", airspeed=22.5, heading=-1).compass_heading_rad is None
 
 
 def test_a_display_without_numbers_says_nothing(plane: Any) -> None:
