@@ -139,8 +139,8 @@ class _Search:
 
     def drawn(self, taken: Bools) -> Floats:
         """Where some plots are, east, north and up of lift-off (k, 3) m, those of them that have a range and an azimuth."""
-        places = np.concatenate([self._located, self._above[:, None]], axis=1)[taken]
-        return places[np.isfinite(places).all(axis=1)]
+        places: Floats = np.concatenate([self._located, self._above[:, None]], axis=1)[taken]
+        return np.asarray(places[np.isfinite(places).all(axis=1)])
 
     def starts(self, told: Collection[str]) -> list[Bools]:
         """Rows that may be one aircraft's: of a numbered track, or unnumbered ones that ask for the same wind."""
