@@ -6,7 +6,7 @@ Source: 002-4, in the gateway.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,7 +36,7 @@ CLEAN_S = 900.0
 KINDS = ((10, car), (1, aeroplane), (2, aeroplane))  # the last tells inertial data only, as a copter does
 TELL_WALKS = KINDS[:2]
 UNHELD: Kinded = ((2, copter), (11, boat))
-SHAKEN = {copter: ROTORS, boat: MOTOR}
+SHAKEN: Mapping[object, Errors] = {copter: ROTORS, boat: MOTOR}
 
 
 def step(time_s: float) -> tuple[float, float, float, float]:
