@@ -72,18 +72,20 @@ def scaled(minds: Minds, spread: Spread, turns: Bools) -> Spread:
     """Sigmas (n, h) as the tracks' own past says they are; `turns` (n, h) where the way or the aircraft turns."""
     scale = _scale(minds.sigmas, minds.counted)
     slots = np.minimum(np.arange(turns.shape[1]), LEARNT - 1)
-    each = np.where(turns[..., None], scale[:, 1][:, slots], scale[:, 0][:, slots])
+    each = scale[np.arange(len(turns))[:, None], turns.astype(np.int64), slots]
     return Spread(spread.along * each[..., 0], spread.across * each[..., 1])
 
 
 def _scale(sigmas: Floats, counted: Floats) -> Floats:
     """What sigmas are scaled by (n, 2, LEARNT, 2), of `Minds.sigmas` and `Minds.counted`."""
-    scale, begins = np.empty(sigmas.shape), np.ones((len(sigmas), 2, 2))
+    known, room = sigmas / USUAL, PRIOR + counted
+    begins: Floats | float = PRIOR
     for horizon in range(LEARNT):
-        known = PRIOR * begins + sigmas[:, :, horizon] / USUAL
-        scale[:, :, horizon] = known / (PRIOR + counted[:, :, horizon, None])
-        begins = np.sqrt(scale[:, :, horizon])
-    return np.clip(scale, LEAST, MOST)
+        one = known[:, :, horizon]
+        one += begins
+        one /= room[:, :, horizon, None]
+        begins = PRIOR * np.sqrt(one)
+    return np.asarray(np.minimum(np.maximum(known, LEAST), MOST))
 
 
 def kept(

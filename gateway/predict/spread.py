@@ -30,10 +30,10 @@ CRUISE, LATE_A_TURN, LATE_IN_TURN, LATE_SLOWER, LATE_LANDED_S = 0.009, 0.056, 0.
 SOON_S = 6.0  # before a way's end: it flares, or turns aside onto a circle
 ROUND_S = 2.5  # half of the time in which it flies the radius of a circle that nobody says
 RESTS, ROUNDS, GOES_ANYWHERE = (0.4, 0.0), (0.25, 0.25), (1.2, 0.7)
-WANDERS_S, WANDERS_FOR_S, WANDERS_A_TURN = 0.05, 40.0, 0.009
-GUSTS_ASIDE_S = 1.5  # for so long the root mean square of gusts carries it aside before it comes back
+WANDERS_S, WANDERS_FOR_S, WANDERS_A_TURN = 0.034, 10.0, 0.0055
+GUSTS_ASIDE_S = 0.2  # for so long the root mean square of gusts carries it aside before it comes back
 ROUND_WANDERS_S = 0.3
-SWINGS, SWINGS_NOW, SWINGS_FOR_S = 0.115, 0.5, 2.0
+SWINGS, SWINGS_NOW, SWINGS_FOR_S = 0.125, 0.5, 2.0
 ACCELERATES_S = 2.7  # who changes its speed goes on doing so for this long
 # of the mean square of gusts: how far off the speed that is kept is, and for how many seconds what comes lasts, twice
 CRUISE_OFF, GUST_LASTS_S = 1.2, 11.0

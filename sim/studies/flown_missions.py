@@ -35,7 +35,7 @@ Ints = NDArray[np.int64]
 
 STARTS = 1_767_225_600 * SECOND
 KINDS = ("aeroplane", "aeroplane", "copter", "aeroplane", "ship", "aeroplane", "helicopter", "aeroplane")  # and anew
-APART_M = 20_000.0  # homes, on a line
+APART_M = 3_000.0  # homes, on a line: nobody is far from the middle of the frame
 RATES_HZ = {
     **{"HEARTBEAT": 1.0, "SYSTEM_TIME": 1.0, "HOME_POSITION": 0.2, "MISSION_CURRENT": 1.0, "VFR_HUD": 1.0},
     **{"GLOBAL_POSITION_INT": 4.0, "GPS_RAW_INT": 1.0, "EXTENDED_SYS_STATE": 1.0},
