@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from gateway import align
-from gateway.align import Fix, Geoid, Plot
+from gateway.align import SECOND, Fix, Geoid, Plot
 from gateway.believing import Believing
 from gateway.making import NAMED_AT_MOST
 from gateway.observation import (
     AirData,
+    Attitude,
     FlightPlan,
     GpsReport,
     Heard,
@@ -20,6 +21,7 @@ from gateway.observation import (
     VehicleStatus,
     WeatherArea,
 )
+from gateway.picture import Event
 from gateway.state import State
 
 CONTRADICTION_M = 5.0  # between the site's and the streams' geoid: beyond this it is said
@@ -151,3 +153,33 @@ class Arriving(Believing):
         self.count("reports of more aircraft than are kept")
         self.once(f"more than {AIRCRAFT_AT_MOST} aircraft at a time: the reports of the others are counted, not used")
         return False
+
+    # the runway, where it is a ship's deck --------------------------------------------------------------------------
+
+    def _hear_heading(self, arrival: Heard) -> None:
+        """What the ship that carries the runway says of her heading."""
+        if self.deck is None:
+            return
+        for one in arrival.observations:
+            if isinstance(one, Attitude) and one.aircraft == self.deck.follows:
+                self.deck = self.deck.heard(one.valid_at, one.yaw_rad)
+
+    def _move_deck(self, at: int) -> None:
+        """The runway to where the ship's track is now; without one it is carried on, and that is said."""
+        if self.deck is None:
+            return
+        before = self.deck.pose
+        number = self.lanes.by_aircraft.get(self.deck.follows)
+        lane = None if number is None else self.lanes.lanes.get(number)
+        if lane is None or lane.ended_at is not None or not lane.events:
+            self.deck, said = self.deck.lost()
+        else:
+            last, silent = lane.last, lane.coasting_at(at, self.options)
+            velocity = last.mean[3:6] * [1.0, 1.0, 0.0]
+            place = last.mean[:3] + velocity * (max(at - last.at, 0) / SECOND)
+            self.deck, said = self.deck.moved(at, place, velocity, silent, self.frame)
+        if said is not None:
+            self.events.append(Event(at, "warning" if self.deck.is_silent else "info", said))
+        if self.deck.pose is not None and self.deck.pose is not before:
+            self.frame = self.frame.with_deck(self.deck.pose)
+            self.poses.append(self.deck.pose)

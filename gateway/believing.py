@@ -59,9 +59,9 @@ class Believing(Making):
             return False
         east, north = report.velocity_east_mps, report.velocity_north_mps
         speed = None if east is None or north is None else math.hypot(east, north)
-        known = self.reckoners.told_last.get(name)
+        known = self.told_last.get(name) or self.reckoners.told_last.get(name)
         last = LastPlace(*here, at, at) if known is None else known.followed_by(at, *here, speed)
-        self.reckoners = self.reckoners.telling(name, last)
+        self.told_last[name] = last
         if last.is_frozen:
             self.count("GPS reports that are frozen")
             if known is not None and not known.is_frozen:

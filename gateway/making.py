@@ -15,7 +15,7 @@ from gateway.fuse.rows import Row
 from gateway.fuse.weighting import Model
 from gateway.observation import Heard, Truth
 from gateway.picture import Event, Health, Picture, SourceHealth
-from gateway.reckon import Reckoned
+from gateway.reckon import LastPlace, Reckoned
 from gateway.register import Residuals
 from gateway.state import State
 
@@ -57,6 +57,9 @@ class Making:
         self.untracked = 0
         self.looks: list[track.Look] = []
         self.reckoned: list[Reckoned] = []
+        self.told_last: dict[
+            str, LastPlace
+        ] = {}  # since dead reckoning last heard of it: each would be a copy of them all
 
     def _work_in(self, lanes: Lanes, job: Job | None) -> None:
         """A job, to be worked together with those of other tracks."""
@@ -80,6 +83,11 @@ class Making:
             if event.restarted is not None:
                 self.count("restarted after divergence")
                 self.events.append(Event(event.at, "warning", f"track {number} started again: {event.restarted}"))
+
+    def _remember_places(self) -> None:
+        """Let dead reckoning know where vehicles were last."""
+        if self.told_last:
+            self.reckoners, self.told_last = self.reckoners.telling(self.told_last), {}
 
     def _with_wind(self, rows: list[Row]) -> list[Row]:
         """Rows with the winds that dead reckoning has found; what it knows changes only where nothing waits."""
@@ -123,6 +131,7 @@ class Making:
     def picture(self, health: Health) -> tuple[State, Picture]:
         """The new state and its picture."""
         self._settle()
+        self._remember_places()
         state = State(
             self.site,
             self.options,
@@ -149,7 +158,7 @@ class Making:
         )
         observations = tuple(observation for arrival in self.heard for observation in arrival.observations)
         own = SourceHealth("gateway", "pipeline", 0.0, 0.0, 0, tuple(sorted(self.counters.items())))
-        table = fuse.table(self.rows, self.ended, self.lived, self.frame, self.model)
+        table = fuse.table(self.rows, self.ended, self.lived, self.settled, self.frame, self.model)
         picture = Picture(
             step=self.before.steps,
             now=self.now or 0,
@@ -158,7 +167,7 @@ class Making:
             track=track.table(self.tracks, self.untracked, self.looks),
             associate=associate.table(self.checks, self.association.ledger, self.changes, self.of_radars),
             register=register.table(self.registration, self.radars, self.now or 0, self.residuals),
-            fuse=replace(table, settled=tuple(self.settled)),
+            fuse=table,
             predict=predict.table(self.forecasts, self.frame, self.rounds),
             truth=tuple(observation for observation in observations if isinstance(observation, Truth)),
             health=replace(health, sources=(*health.sources, own)),

@@ -25,6 +25,7 @@ class Reckoning(Fusing):
 
     def _reckon(self, at: int) -> None:
         """At a whole second: all vehicles go on; many do so in shares, later in the second."""
+        self._remember_places()
         if self.options.dead_reckoning == "off" or self.reckoners.is_idle:
             return
         self.reckoners = self.reckoners.planning(at)

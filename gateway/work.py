@@ -12,7 +12,7 @@ from gateway.associating import Associating
 from gateway.fuse import Lane
 from gateway.fuse.evidence import Finding
 from gateway.making import NAMED_AT_MOST
-from gateway.observation import Attitude, Heard
+from gateway.observation import Heard
 from gateway.picture import Event
 from gateway.register import WAIT_NS, gathered, residuals
 
@@ -188,42 +188,12 @@ class Work(Associating):
         self.ended += ended
         self.tracks, self.association = track.RadarTracks(), associate.Association()
         self.unnumbered = self.unnumbered.emptied()
-        self.reckoners = self.reckoners.emptied()
+        self.reckoners, self.told_last = self.reckoners.emptied(), {}
         self.registration = self.registration.again(now)
         self.predicting, self.probing = self.predicting.planning((), now), predict.Probing()
         self.consistency = self.consistency.again()
         # An arrival stamped at a whole second comes before what happens at that second.
         self.now, self.instant = now, (now - 1) // SECOND * SECOND + SECOND
-
-    # the runway, where it is a ship's deck --------------------------------------------------------------------------
-
-    def _hear_heading(self, arrival: Heard) -> None:
-        """What the ship that carries the runway says of her heading."""
-        if self.deck is None:
-            return
-        for one in arrival.observations:
-            if isinstance(one, Attitude) and one.aircraft == self.deck.follows:
-                self.deck = self.deck.heard(one.valid_at, one.yaw_rad)
-
-    def _move_deck(self, at: int) -> None:
-        """The runway to where the ship's track is now; without one it is carried on, and that is said."""
-        if self.deck is None:
-            return
-        before = self.deck.pose
-        number = self.lanes.by_aircraft.get(self.deck.follows)
-        lane = None if number is None else self.lanes.lanes.get(number)
-        if lane is None or lane.ended_at is not None or not lane.events:
-            self.deck, said = self.deck.lost()
-        else:
-            last, silent = lane.last, lane.coasting_at(at, self.options)
-            velocity = last.mean[3:6] * [1.0, 1.0, 0.0]
-            place = last.mean[:3] + velocity * (max(at - last.at, 0) / SECOND)
-            self.deck, said = self.deck.moved(at, place, velocity, silent, self.frame)
-        if said is not None:
-            self.events.append(Event(at, "warning" if self.deck.is_silent else "info", said))
-        if self.deck.pose is not None and self.deck.pose is not before:
-            self.frame = self.frame.with_deck(self.deck.pose)
-            self.poses.append(self.deck.pose)
 
     # register -----------------------------------------------------------------------------------------------------
 

@@ -167,7 +167,12 @@ def _pressure_altitude_m(row: Row) -> float:
 
 
 def table(
-    rows: Sequence[Row], ended: Sequence[Ended], lived: Sequence[LifeChange], frame: RunwayFrame, model: Model
+    rows: Sequence[Row],
+    ended: Sequence[Ended],
+    lived: Sequence[LifeChange],
+    settled: Sequence[Settled],
+    frame: RunwayFrame,
+    model: Model,
 ) -> Fused:
     """Rows as columns, in geodetic coordinates and with velocity and covariance along the axes at each point."""
     n = len(rows)
@@ -202,6 +207,7 @@ def table(
         wind_mps=np.array([row.wind_mps for row in rows]).reshape(n, 2),
         ended=tuple(ended),
         lived=tuple(lived),
+        settled=tuple(settled),
     )
 
 

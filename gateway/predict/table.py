@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -75,6 +76,15 @@ class Forecast:
 
 def table(forecasts: Sequence[Forecast], frame: RunwayFrame, rounds: Sequence[conflicts.Round] = ()) -> Predicted:
     """Forecasts, and rounds of the conflict probe, as columns in geodetic coordinates."""
+    return _as_columns(forecasts, frame, rounds) if forecasts or rounds else _nothing(frame)
+
+
+@lru_cache(maxsize=1)  # most steps foretell nothing, and a frame stays
+def _nothing(frame: RunwayFrame) -> Predicted:
+    return _as_columns((), frame, ())
+
+
+def _as_columns(forecasts: Sequence[Forecast], frame: RunwayFrame, rounds: Sequence[conflicts.Round]) -> Predicted:
     each = [len(f.horizons_s) for f in forecasts]
     made_at = _joined([np.full(f.course.size, f.made, dtype=np.int64) for f in forecasts], np.int64)
     horizon_s = _joined([np.tile(np.array(f.horizons_s), len(f.tracks)) for f in forecasts])

@@ -106,9 +106,9 @@ class Reckoners:
         """The same with a position that a vehicle told, as `told.PLACE`."""
         return replace(self, places=(*self.places, (aircraft, at, place)))
 
-    def telling(self, aircraft: str, last: LastPlace) -> Reckoners:
-        """The same with the place that a vehicle told last."""
-        return replace(self, told_last={**self.told_last, aircraft: last})
+    def telling(self, told: Mapping[str, LastPlace]) -> Reckoners:
+        """The same with the places that some vehicles told last."""
+        return replace(self, told_last={**self.told_last, **told})
 
     def easing(self, aircraft: str, easing: Easing) -> Reckoners:
         """The same with how a vehicle's positions are approached."""

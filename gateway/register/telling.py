@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,15 +33,21 @@ def table(
     registration: Registration, radars: Mapping[int, RadarSite], now: int, learnt: Sequence[Residuals]
 ) -> Registered:
     """What is known of each radar, and what is taken off at an instant."""
-    numbers = tuple(sorted(radars))
-    correction: Floats = np.array([registration.of(radars[number], now) for number in numbers]).reshape(-1, EACH)
-    told = replace(Registered.untold(numbers, correction), residuals=Residuals.of(learnt))
+    some = tuple(radars[number] for number in sorted(radars))
+    correction: Floats = np.array([registration.of(radar, now) for radar in some]).reshape(-1, EACH)
+    return replace(_known(registration, some), correction=correction, residuals=Residuals.of(learnt))
+
+
+@lru_cache(maxsize=4)  # it changes each second, and is told at each step
+def _known(registration: Registration, radars: tuple[RadarSite, ...]) -> Registered:
+    """What is known of some radars, without what is taken off."""
+    told = Registered.untold([radar.number for radar in radars], np.zeros((len(radars), EACH)))
     solution = registration.solution
     if solution is None:
         return told
     words = list(told.verdict)
-    for row, number in enumerate(numbers):
-        verdicts, choice = registration.verdicts(radars[number]), registration.choices.get(number)
+    for row, radar in enumerate(radars):
+        verdicts, choice = registration.verdicts(radar), registration.choices.get(radar.number)
         if verdicts is None:
             continue
         told.error[row], told.sigma[row] = [one.value for one in verdicts], [one.sigma for one in verdicts]

@@ -164,7 +164,12 @@ class RadarTracks:
 
 def table(tracks: RadarTracks, untracked: int, looks: Sequence[Look] = ()) -> Tracked:
     """The radar tracks alive, by name, and what else the step found."""
-    return Tracked(tuple(sorted({name_of(key) for key in tracks.plots})), untracked, tuple(looks))
+    return Tracked(_names(tuple(tracks.plots)), untracked, tuple(looks))
+
+
+@lru_cache(maxsize=1)  # the same at most steps
+def _names(keys: tuple[Key, ...]) -> tuple[str, ...]:
+    return tuple(sorted({name_of(key) for key in keys}))
 
 
 @lru_cache(maxsize=4096)

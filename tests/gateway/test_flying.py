@@ -192,7 +192,7 @@ def apart_m(one: GpsReport, latitude_rad: float, longitude_rad: float) -> float:
 
 def test_who_tells_no_place_for_a_minute_is_forgotten() -> None:
     """What was told last of vehicles that are gone is not kept: of thousands it would be copied with each report."""
-    gone = Reckoners().telling("mavlink:9", LastPlace(0.8, 0.1, 0, 0))
+    gone = Reckoners().telling({"mavlink:9": LastPlace(0.8, 0.1, 0, 0)})
     assert gone.planning(60 * SECOND).told_last
     assert not gone.planning(61 * SECOND).told_last
     assert gone.planning(61 * SECOND).is_idle
