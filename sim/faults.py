@@ -78,6 +78,13 @@ class GpsNoise(GpsFault):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class GpsVelocity(GpsFault):
+    """Velocities are so many times what they are: of another unit, of the wrong sign, or 0; positions are right."""
+
+    times: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RadarFault(Fault):
     """A fault of a radar."""
 

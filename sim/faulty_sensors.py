@@ -17,6 +17,7 @@ from sim.faults import (
     GpsLost,
     GpsNoise,
     GpsSpoofed,
+    GpsVelocity,
     RadarComponentLost,
     RadarError,
     RadarMoved,
@@ -56,6 +57,9 @@ def faulty_gps(faults: Sequence[Fault], measured: GpsMeasured) -> GpsMeasured:
             measured = _spoofed(fault, lasts, measured)
         elif isinstance(fault, GpsFrozen):
             measured = _frozen(lasts, measured)
+        elif isinstance(fault, GpsVelocity):
+            told = np.where(lasts[:, None], fault.times * measured.velocity_mps, measured.velocity_mps)
+            measured = replace(measured, velocity_mps=told)
         elif isinstance(fault, GpsLost):
             if fault.shows == "silence":
                 measured = replace(measured, heard=measured.heard & ~lasts)

@@ -139,6 +139,7 @@ FAULTS: Mapping[str, FaultKind] = {
         some_of=("step_m", "walks_mps", "step_up_m", "climbs_mps"),
     ),
     "gps noise": FaultKind(faults.GpsNoise, _of_gps("sigma_m", sigma_m=("sigma_m", number(0.0, 1e5)))),
+    "gps velocity": FaultKind(faults.GpsVelocity, _of_gps("times", times=("times", number(-1e4, 1e4)))),
     "radar off": FaultKind(faults.RadarOff, _of_radar()),
     "radar component lost": FaultKind(
         faults.RadarComponentLost, _of_radar("component", component=("components", _components))

@@ -140,6 +140,16 @@ def test_a_source_gets_noisier() -> None:
     assert more == pytest.approx(np.where(during(usual.valid_s), 4.0, 1.0) * less, abs=1e-6)
 
 
+def test_velocities_are_of_another_unit() -> None:
+    """Twice as fast while it lasts, of one aircraft; positions are as they were."""
+    given = scene("gps velocity", vehicle=1, times=2.0)
+    for number, times in ((0, 2.0), (1, 1.0)):
+        told, usual = (reports(one, one.aircraft[number]) for one in (given, scene()))
+        wanted = np.where(during(usual.valid_s), times, 1.0)[:, None] * usual.velocity_mps
+        assert told.velocity_mps == pytest.approx(wanted)
+        assert np.array_equal(told.latitude_rad, usual.latitude_rad)
+
+
 def test_a_radar_that_is_off_sends_nothing() -> None:
     """Neither scans nor status, and both again afterwards."""
     times = [at for at, _ in scans(scene("radar off"))]
