@@ -16,6 +16,7 @@ from gateway.observation import Observation, RadarPlot, RadarStatus
 from gateway.offline.carrying import Muted, Place, frame_at, on_plane
 from gateway.offline.parameters import Series, Times
 from gateway.register import Remembered
+from gateway.register.corrections import stated
 from gateway.settings import RadarSite, Site
 
 Floats = NDArray[np.float64]
@@ -113,12 +114,12 @@ def _view(series: Series, radar: RadarSite, frame: RunwayFrame, remembered: Reme
 
 def _too_much(radar: RadarSite, remembered: Remembered | None) -> Correction:
     """Range m, azimuth rad, elevation rad, time s."""
-    stated = (radar.range_error_m, radar.azimuth_error_rad, radar.elevation_error_rad, radar.time_error_s)
+    by_site = stated(radar)
     known = None if remembered is None else remembered.of(radar, 0.0)
     if known is None:
-        return stated
+        return by_site
     range_m, azimuth, elevation, late = (
-        own if math.isnan(learnt) else float(learnt) for own, learnt in zip(stated, known[0], strict=True)
+        own if math.isnan(learnt) else float(learnt) for own, learnt in zip(by_site, known[0], strict=True)
     )
     return range_m, azimuth, elevation, late
 

@@ -88,7 +88,7 @@ def _take(observation: Observation, recorded: Recorded) -> None:
 def radar_views(recorded: Recorded, playback: Playback, place: Place | None, session: Path | None) -> list[View]:
     """What the radars of a recording saw, at its place or another; of a session with what it learnt of them taken off.
 
-    None where nothing tells where the radars stand. Raises FileError, FolderError.
+    Empty where nothing tells where the radars stand. Raises FileError, FolderError.
     """
     if not recorded.sightings.plots:
         return []
