@@ -21,6 +21,7 @@ from sim.studies.without_unit import simulated, windows
 from sim.told_pictures import FALSE_FROM_S, QUIET, SECOND, START, errors_m, goes_away, pictures, told
 from sim.told_rides import Teller, honest
 
+HEARD_FROM = START + (FALSE_FROM_S - 20.0) * SECOND
 OVER = START + (FALSE_FROM_S + 20.0) * SECOND
 Changed = Callable[[Observation], Observation | None]
 
@@ -52,7 +53,7 @@ def heading_only(each: Observation) -> Observation | None:
 def gone(kind: str, changed: Changed) -> tuple[list[tuple[float, str, float, float]], float]:
     """The rows that dead reckoning wrote in twenty seconds without positions; where a constant velocity is by the last."""
     teller, said = said_by(kind, goes_away, changed)
-    some = [picture for _, picture in pictures(one for one in said if one.now < OVER)]
+    some = [picture for _, picture in pictures(one for one in said if HEARD_FROM < one.now < OVER)]
     rows = [row for row in errors_m(teller, some) if row[1] == "dead-reckoning"]
     motion, begin = teller.ride.motion, round(FALSE_FROM_S * 50)
     last = begin + round(rows[-1][0] * 50)
@@ -125,7 +126,7 @@ def stood(changed: Changed) -> tuple[Picture, ...]:
             changed_one = changed(each)
             some += [] if changed_one is None else [changed_one]
         made.append(replace(one, observations=tuple(some)))
-    return tuple(picture for _, picture in pictures(one for one in made if one.now < OVER))
+    return tuple(picture for _, picture in pictures(one for one in made if HEARD_FROM < one.now < OVER))
 
 
 @pytest.mark.parametrize(("armed", "landed"), [pytest.param(False, None, marks=pytest.mark.study), (True, "on ground")])
@@ -138,8 +139,7 @@ def test_what_says_that_it_rests_stays_where_it_is(armed: bool, landed: str | No
         return without_unit(each)
 
     teller, _ = told("car", goes_away)
-    still = replace(teller.ride.motion)
-    rows = [row for picture in stood(resting) for row in _off_m(picture, still)]
+    rows = [row for picture in stood(resting) for row in _off_m(picture, teller.ride.motion)]
     assert len(rows) >= 16
     assert max(off for off, _ in rows) < 5.0
     assert max(sigma for _, sigma in rows) - rows[0][1] < 5.0
