@@ -30,7 +30,7 @@ from adapters.listening import Listened
 from adapters.mavlink import MavlinkObserver
 from adapters.mavlink_frames import Frame, parse
 from adapters.meters import SECOND
-from adapters.radar import LandingRadarReceiver, observations
+from adapters.radar import LandingRadarReceiver, observations, refusal_advice
 from adapters.radar import Taken as TakenDatagram
 from adapters.radar_clocks import RadarClocks
 from adapters.signing import advice
@@ -217,10 +217,14 @@ class Decoder:
         if reason is None:
             return True
         listened.counters[reason] += 1
-        if reason not in listened.advised:
-            listened.advised.add(reason)
-            self._notes.append(("warning", advice(reason, listened.source.origin)))
+        self._advise(listened, reason, advice(reason, listened.source.origin))
         return False
+
+    def _advise(self, listened: Listened, reason: str, sentence: str) -> None:
+        """Say, the first time that something of a source is refused for a reason, what there is to do."""
+        if sentence and reason not in listened.advised:
+            listened.advised.add(reason)
+            self._notes.append(("warning", sentence))
 
     def _hear_mavlink(self, arrival: Arrival, frame: Frame | None, listened: Listened) -> Observations:
         if frame is None:
@@ -266,6 +270,7 @@ class Decoder:
         outcome = self._radar.hear(arrival.data, (arrival.source, arrival.peer), origin, now)
         if not isinstance(outcome, TakenDatagram):
             self.refused = outcome
+            self._advise(listened, outcome, refusal_advice(outcome, origin))
             return ()
         self._notes.extend(outcome.notes)
         timing = self._radar_clocks.timing(outcome.datagram.header, arrival.received_at)

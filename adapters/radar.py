@@ -172,6 +172,21 @@ class LandingRadarReceiver:
         return tuple(notes)
 
 
+def refusal_advice(reason: Reason, origin: str) -> str:
+    """What to tell a person the first time that a datagram is refused for a reason; "": damage, which is counted only."""
+    return f"{origin}: {_ADVICE[reason]}" if reason in _ADVICE else ""
+
+
+_ADVICE: Mapping[Reason, str] = {
+    "magic": "what comes is no landing radar's, and is refused; is it sent to the right port?",
+    "version": "a landing radar speaks a version of the protocol that is not known here, and is refused.",
+    "tag": "a radar's datagrams without a right tag are refused; is its key_file in the site file the key that was set up there?",
+    "replayed": "a keyed radar's datagrams that were sent before, or are more than 10 s old or early, are refused; "
+    "is its clock set, and is nobody playing a recording?",
+    "too many radars": f"more than {_RADARS_AT_MOST} radars without a key are not heard.",
+}
+
+
 def observations(datagram: Datagram, received_at: int, timing: Timing) -> tuple[RadarPlot | RadarStatus, ...]:
     """A datagram's records as observations: radians, metres, ns; the time of measurement is what they mean."""
     header = datagram.header

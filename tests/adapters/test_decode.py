@@ -97,6 +97,19 @@ def test_a_refused_datagram_tells_why_and_the_next_one_is_not_spoiled() -> None:
     assert decoder.counters() == {"radar-1 datagrams": 1, "radar-1 duplicate": 1, "radar-1 length": 1}
 
 
+def test_datagrams_with_a_wrong_tag_are_told_of_once_and_damaged_ones_only_counted() -> None:
+    decoder, told = Decoder([RADAR], keys={1: b"key"}), []
+    for number in range(6):
+        data = _datagram(number, T0 + number, key=b"other" if number % 2 else b"key")
+        told += decoder.feed(Arrival(T0 + number, 3, data if number != 4 else data[:-1], "10.0.0.1:5")).notes
+    assert decoder.counters() == {"radar-1 datagrams": 2, "radar-1 length": 1, "radar-1 lost": 1, "radar-1 tag": 3}
+    sentences = [text for level, text in told if level == "warning"]
+    assert len(sentences) == 1
+    assert sentences[0].startswith(
+        "10.0.0.1:5 on udpin:127.0.0.1:30070: a radar's datagrams without a right tag are refused"
+    )
+
+
 def test_without_its_refused_datagrams_a_replay_hears_the_same() -> None:
     keys = {1: b"key"}
     arrivals = []
