@@ -94,7 +94,7 @@ class Reckoning(Fusing):
             return
         least, words = f"{found.told_from_mps:.1f} m/s", self.reckoners.by(found.aircraft).words
         if found.told_from_mps <= WALK_MPS:
-            text = f"{found.aircraft}: a position that walks off at {least} or more is denied by {words}"
+            text = f"{found.aircraft}: a position that walked off at {least} or more would be denied by {words}"
         else:
             text = (
                 f"{found.aircraft}: {words} tell a position that walks off with velocities to match from {least} on only;"
