@@ -29,6 +29,7 @@ from gateway.cli import (
     study,
 )
 from gateway.cli.failures import Failure
+from gateway.cli.help_texts import flowing
 
 app = typer.Typer(
     name="talkdown",
@@ -60,6 +61,8 @@ _COMMANDS = (
 )
 for command in _COMMANDS:
     command.register(app)
+for registered in app.registered_commands:
+    registered.help = flowing(registered.help or "")
 
 # click's UsageError, wherever this version of typer keeps its click
 _WRONG_USAGE = cast("type[Exception]", typer.BadParameter.__bases__[0])

@@ -34,7 +34,7 @@ class Selection:
         typer.Option(
             "--runway",
             metavar="NAME",
-            help="Only those that land on it: 16, or the name of a [[runway]] of --procedure, as 26L.",
+            help="Only those that land on it: 16, or the name of a [\\[runway]] of --procedure, as 26L.",
             show_default=False,
         ),
     ] = None

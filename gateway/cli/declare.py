@@ -15,7 +15,7 @@ _HELP = """
 Tell a `talkdown live` on this machine where an aircraft goes: what is declared beats what its plan says and what is inferred,
 as long as it is flown. With --withdraw that ends. It is recorded with the session, and a replay does the same.
 
-A point is a [[waypoint]] of the site, [bold]runway[/], [bold]go-around[/], [bold]home[/], the number of an item of its plan,
+A point is a [\\[waypoint]] of the site, [bold]runway[/], [bold]go-around[/], [bold]home[/], the number of an item of its plan,
 or LATITUDE,LONGITUDE[,ALTITUDE] in degrees and metres above mean sea level.
 
 Examples:
@@ -44,7 +44,10 @@ def declare(
     file: Annotated[
         Path | None,
         typer.Option(
-            "--file", metavar="FILE", help="All that a file declares, [[declared]] and [[weather]].", show_default=False
+            "--file",
+            metavar="FILE",
+            help="All that a file declares, [\\[declared]] and [\\[weather]].",
+            show_default=False,
         ),
     ] = None,
     port: Annotated[

@@ -35,7 +35,7 @@ class Declares:
         typer.Option(
             "--declared",
             metavar="FILE",
-            help="A TOML file that is watched: [[declared]] where aircraft go, [[weather]] to avoid.",
+            help="A TOML file that is watched: [\\[declared]] where aircraft go, [\\[weather]] to avoid.",
             show_default=False,
         ),
     ] = None

@@ -7,15 +7,13 @@ import json as text
 import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import UsageError
-
-if TYPE_CHECKING:
-    from sim.studies import Study
+from sim.studies import STUDIES, Study
 
 _HELP = """
 Run a paper's experiment and show its table; its figures go into an .rrd for the viewer.
@@ -32,7 +30,9 @@ def register(app: typer.Typer) -> None:
 
 
 def study(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Which study, such as fusion.", show_default=False)],
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help=f"Which study: {', '.join(STUDIES)}.", show_default=False)
+    ],
     runs: Annotated[int, typer.Option("--runs", metavar="N", min=1, help="How often each case is drawn.")] = 200,
     seed: Annotated[int, typer.Option("--seed", metavar="N", help="Of the random numbers.")] = 1,
     rrd: Annotated[
@@ -45,8 +45,6 @@ def study(
     """Run a paper's experiment."""
     from rich.console import Console
     from rich.progress import Progress
-
-    from sim.studies import STUDIES
 
     if name not in STUDIES:
         raise UsageError(f"There is no study {name!r}; there are: {', '.join(STUDIES)}.")

@@ -35,7 +35,8 @@ COMMANDS = (
 def test_every_command_explains_itself_with_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run([command, "--help"]) == 0
     told = capsys.readouterr().out
-    assert f"talkdown {command}" in told
+    assert f"\n   talkdown {command}" in told
+    assert "[]" not in told, "a [[table]] was taken for markup"
 
 
 def test_without_arguments_the_commands_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
