@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 PAUSE_NS = 2_500_000_000  # between two attitudes: beyond it nobody knows how it turned; and so long an airspeed counts
 PARTS = 6  # of what is between two attitudes: `cells.GAP_NS` lies between two samples at most
 LISTENS_S = 10.0  # before it is said that no unit tells of a vehicle
-FEWEST_HZ = 3.0  # samples of a unit that can be used
+FEWEST_HZ, ENOUGH_HZ = 3.0, 4.0  # samples of a unit that can be used; and of one that could not be until now
 STEEPEST = 0.3  # cosine: a mast that leans further does not bear the weight
 RATE_NOISE = math.radians(0.2)  # rad/s in a root Hz
 FORCE_NOISE = {  # m/s2 in a root Hz, along the body
@@ -51,11 +51,12 @@ def _level(at: NDArray[np.int64], heading_rad: Floats) -> Series:
     return Series(at, from_angles(flat, flat, heading_rad))
 
 
-def carried_by(told: Told, vehicle_type: int | None) -> By:
+def carried_by(told: Told, vehicle_type: int | None, until_now: By = By.UNIT) -> By:
     """What carries a vehicle on, as it looks: a unit, unless it has told for a while how it lies and of a unit too little."""
     lies = lying(told).at
     span_s = int(lies[-1] - lies[0]) / 1e9 if len(lies) else 0.0
-    if span_s < LISTENS_S or len(told.inertial.at) >= FEWEST_HZ * span_s:
+    least_hz = FEWEST_HZ if until_now == By.UNIT else ENOUGH_HZ  # at each change all begins anew
+    if span_s < LISTENS_S or len(told.inertial.at) >= least_hz * span_s:
         return By.UNIT
     if vehicle_type in WINGS:
         return By.AIRSPEED if len(told.series[AIRSPEED].at) else By.UNIT

@@ -71,7 +71,7 @@ def judged(tip: Tip, place: Floats, late_s: Floats, held: Bools, unseen: Floats,
     walks = (trusted & (held | is_proved(tip)))[:, None] & old & (worst[:, 1:] > bound[:, None])
     disagrees = walks_away(tip, square) & refuses
     refused = tip.denied != NOTHING
-    still = (tip.denied == DISAGREES) & walks_still(tip, square)
+    still = (tip.denied != JUMPED) & walks_still(tip, square)
     agreed = np.where(refused & (worst[:, 0] < NEAR) & ~still, tip.agreed + 1, 0)
     returns = refused & (agreed >= AGREES_FOR)
     by_unit = walks.any(axis=1)

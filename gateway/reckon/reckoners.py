@@ -15,13 +15,14 @@ import numpy as np
 
 from gateway.observation import Observation
 from gateway.reckon.cells import CELL_NS, SECOND, Cells, cells, covered_until
+from gateway.reckon.flying import carried_by, with_unit
 from gateway.reckon.freezing import LastPlace
 from gateway.reckon.kinds import By, Kinds
 from gateway.reckon.reckoned import Floats, Reckoned, reckoned, wind_mps
 from gateway.reckon.running import run
 from gateway.reckon.tip import NOTHING
 from gateway.reckon.told import INERTIAL, PLACE, Series, Told, before, by_share, carrying, portioned, tells_motion
-from gateway.reckon.vehicle import Reckoner, begun_or_kept, moving, pruned, untouched, with_portion
+from gateway.reckon.vehicle import Reckoner, begun_or_kept, pruned, untouched, with_portion
 from gateway.settings import DeadReckoning
 
 VEHICLES_AT_MOST = 200
@@ -178,8 +179,8 @@ class Reckoners:
             if aircraft in by_place and not is_new:
                 more = by_place[aircraft]
                 told, since = replace(told, places=told.places.with_more(more)), min(since, int(more.at[0]))
-            reckoner, moves = moving(replace(was, told=told), self.types.get(aircraft))
-            reckoner = begun_or_kept(reckoner, moves, since, share.at, settings)
+            moves = with_unit(told, carried_by(told, self.types.get(aircraft), was.by))
+            reckoner = begun_or_kept(replace(was, told=told), moves, since, share.at, settings)
             changed[aircraft] = reckoner
             end = 0 if reckoner.tip is None else covered_until(moves, int(reckoner.tip.cell[0]))
             if reckoner.tip is not None and end > reckoner.tip.cell[0]:

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gateway.reckon.cells import BLOCK, CELL_NS, SECOND, SECOND_CELLS, covered_until, first_covered
-from gateway.reckon.flying import carried_by, with_unit
 from gateway.reckon.kinds import By
 from gateway.reckon.running import begun
 from gateway.reckon.tip import Tip
 from gateway.reckon.told import ATTITUDE, HEADING, INERTIAL, Series, Told
+from gateway.reckon.walking import acquainted
 from gateway.settings import DeadReckoning
 
 NEAR_ATTITUDE_NS = 500_000_000
@@ -25,11 +25,12 @@ SILENT_NS = 3 * SECOND  # an inertial unit that says nothing for so long: nobody
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reckoner:
-    """One vehicle. `tips`: at whole seconds, oldest first, and the newest."""
+    """One vehicle. `tips`: at whole seconds, oldest first, and the newest; `former`: the last one, while there is none."""
 
     told: Told = Told()
     tips: tuple[Tip, ...] = ()
     by: By = By.UNIT
+    former: Tip | None = None
 
     @property
     def tip(self) -> Tip | None:
@@ -55,25 +56,20 @@ def untouched(tips: tuple[Tip, ...], since: int) -> tuple[Tip, ...]:
     return tips[:1] + tuple(tip for tip in tips[1:] if int(tip.cell[0]) * CELL_NS <= since)
 
 
-def moving(one: Reckoner, vehicle_type: int | None) -> tuple[Reckoner, Told]:
-    """A vehicle, by what carries it on; and what it told, what a unit would have told included where it has none."""
-    by = carried_by(one.told, vehicle_type)
-    if by != one.by:
-        one = replace(one, tips=(), by=by)
-    return one, with_unit(one.told, by)
-
-
-def begun_or_kept(one: Reckoner, told: Told, since: int, at: int, settings: DeadReckoning) -> Reckoner:
-    """A vehicle's tips as far as they still hold; the first one, where dead reckoning can begin."""
-    tips = untouched(one.tips, since)
+def begun_or_kept(one: Reckoner, moves: Told, since: int, at: int, settings: DeadReckoning) -> Reckoner:
+    """A vehicle's tips as far as they still hold; the first one, where dead reckoning can begin. `moves`: what it told, what
+    a unit would have told included where it has none.
+    """
+    former = one.former if one.tip is None else one.tip
+    tips = untouched(one.tips, since) if moves.by == one.by else ()
     if tips:
-        end = covered_until(told, int(tips[-1].cell[0]))
+        end = covered_until(moves, int(tips[-1].cell[0]))
         if at - end * CELL_NS > SILENT_NS:  # for so long what is missing may still come
             tips = ()
     if not tips:
-        first = first_tip(told, settings)
-        tips = () if first is None else (first,)
-    return replace(one, tips=tips)
+        first = first_tip(moves, settings)
+        tips = () if first is None else (first if former is None else acquainted(first, former),)
+    return replace(one, tips=tips, by=moves.by, former=None if tips else former)
 
 
 def first_tip(told: Told, settings: DeadReckoning) -> Tip | None:

@@ -8,6 +8,7 @@ a false position by this alone. One whose velocities are false too must be found
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -21,13 +22,15 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 PAUSE_S = 1.6  # between two positions: beyond it nobody knows how it went
-FOLLOWED = 40  # positions without a pause: before that an autopilot may still be finding where it is
+FOLLOWED = 40  # positions without a longer pause: before that an autopilot may still be finding where it is
+REACQUIRED_S = 6.0  # that much longer: radios pause for so long; what found its fix again may be led back to it
 OFF_MPS = 0.25  # an axis: what velocities are off by for half a minute
 WANDERS_M = 1.5  # an axis: what good positions wander by meanwhile
 DEGREES = 2.0
 APART = 27.6  # chi-square of two degrees, passed once in 10^6
 TOGETHER = 9.2  # once in a hundred
 OLD_S, FRESH_S = 4.0, 11.0  # since when it is looked at; and hypotheses as young as that say whether it walks now
+TIMES = 3.0  # what it usually strays by, or should: a position counts as so much at most, so that walks are not learnt
 REMEMBERS = 400.0  # the mean of what a source strays by is of so many positions, at most
 
 
@@ -45,13 +48,14 @@ def followed(tip: Tip, place: Floats, late_s: Floats) -> tuple[Tip, Floats, Floa
     known = (took_s > 0.0) & (took_s <= PAUSE_S) & np.isfinite(walked).all(axis=1)
     walks = np.where(known[:, None, None], tip.walked_m, 0.0)
     walks[:, 0] += np.where(known[:, None], walked, 0.0)
-    count = np.where(known, tip.followed + 1, 0)
+    count = np.where(known, tip.followed + 1, np.where(took_s <= REACQUIRED_S, tip.followed, 0))
     off = walks[:, :1] - walks[:, 1:]
     age_s = (tip.cell[:, None] - tip.seeded[:, 1:]) * CELL_S
     variance = 2.0 * WANDERS_M**2 + (OFF_MPS * age_s) ** 2
     square = np.where(age_s >= OLD_S, np.sum(off**2, axis=-1) / variance, 0.0)
     share = np.where(known & (tip.denied == NOTHING), 1.0 / np.minimum(count + 1.0, REMEMBERS), 0.0)
-    strays = tip.strays + share * (square.max(axis=1) / DEGREES - tip.strays)
+    most = np.where(count < FOLLOWED, math.inf, TIMES * np.maximum(tip.strays, 1.0))
+    strays = tip.strays + share * (np.minimum(square.max(axis=1) / DEGREES, most) - tip.strays)
     last = np.concatenate([place[:, :2], place[:, 3:5], late_s[:, None]], axis=-1)
     return replace(tip, last=last, placed=tip.cell, walked_m=walks, followed=count, strays=strays), off, square
 
@@ -65,7 +69,13 @@ def walks_away(tip: Tip, square: Floats) -> Bools:
 def walks_still(tip: Tip, square: Floats) -> Bools:
     """Whether positions walk away now (n,)."""
     fresh = (tip.cell[:, None] - tip.seeded[:, 1:]) * CELL_S <= FRESH_S
-    return np.asarray((fresh & (square > TOGETHER)).any(axis=1))
+    bound = TOGETHER * np.maximum(tip.strays, 1.0)
+    return np.asarray((fresh & (square > bound[:, None])).any(axis=1))
+
+
+def acquainted(tip: Tip, former: Tip) -> Tip:
+    """A vehicle's tip that begins anew, with what an earlier one knew of its positions and their velocities."""
+    return replace(tip, last=former.last, placed=former.placed, followed=former.followed, strays=former.strays)
 
 
 def forgotten(tip: Tip, rows: Bools) -> Tip:
