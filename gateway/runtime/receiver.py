@@ -1,4 +1,7 @@
-"""The one receiving thread: drains the links, stamps what came and hands it over through a bounded queue.
+"""The receiving thread: drains the links, stamps what came and hands it over through a bounded queue.
+
+While it rests, because much comes, who asks for what came takes the newest by himself, so that it waits for no rest and for
+no turn at the interpreter: of a hundred vehicles that was 4 of the 15 ms from an arrival to its picture.
 
 What does not fit into the queue is counted, never silent; what is handed over stays in the order of its stamps. A
 watermark comes with every hand-over: nothing that was stamped at or before it is still to come.
@@ -23,7 +26,7 @@ from gateway.runtime.stamps import Stamper
 _SELECTOR = getattr(selectors, "PollSelector", selectors.SelectSelector)
 _WAIT_S = 0.02  # how long the thread waits for bytes before it looks at its links and moves the watermark
 _LAST_TURNS = 100  # what the kernel still holds at the end, but never a peer that sends without pause
-_REST_S = 0.004  # between turns that brought something
+_REST_S = 0.008  # between turns that brought something; a tick takes what came meanwhile
 _MUCH = 100  # chunks a turn from which on it may rest longer: few large turns cost less than many small ones
 _VERY_MUCH = 400  # from here on twice as long: what is taken sooner waits for its tick
 _OUTBOX_AT_MOST = 1000
@@ -58,6 +61,7 @@ class Receiver:
         self._intake = Intake(self._stamper, *origins, allowed)
         self._capacity = capacity
         self._lock = threading.Lock()
+        self._taking = threading.Lock()  # whoever has it may touch the links
         self._closing = threading.Event()
         self._failure: BaseException | None = None
         self._overflow = 0
@@ -81,6 +85,11 @@ class Receiver:
         """What came since the last call. Raises what ended the receiving thread, if something did."""
         if self._failure is not None:
             raise self._failure
+        if self._rest_s and not self._closing.is_set() and self._taking.acquire(blocking=False):
+            try:
+                self._take()
+            finally:
+                self._taking.release()
         with self._lock:
             sources, notes = tuple(self._new_sources), tuple(self._notes)
             watermark, arrivals = self._watermark, self._arrivals
@@ -136,15 +145,20 @@ class Receiver:
             self._failure = error
 
     def _turn(self, wait_s: float) -> int:
-        """Wait for bytes, take in what all links have, move the watermark; how many chunks came."""
+        """Wait for bytes, take in what all links have; how many chunks came."""
+        self._wait(wait_s)
+        with self._taking:
+            count = self._take()
+        self._rest_s = self._rest(count)
+        return count
+
+    def _take(self) -> int:
+        """Send what waits, take in what all links have, move the watermark; how many chunks came."""
         now_ns = time.monotonic_ns()
         for link in self._links:
             link.tend(now_ns)
         self._send_what_waits()
-        self._wait(wait_s)
         heard = [(number, chunks) for number, link in enumerate(self._links) if (chunks := link.receive()).data]
-        count = sum(len(chunks.data) for _, chunks in heard)
-        self._rest_s = self._rest(count)
         taken = [self._intake.take(heard)]
         if self._told:
             taken.append(self._intake.tell([self._told.popleft() for _ in range(len(self._told))]))
@@ -157,7 +171,7 @@ class Receiver:
                 self._put(arrivals, notes)
             self._notes += notes
             self._watermark = self._stamper.watermark()
-        return count
+        return sum(len(chunks.data) for _, chunks in heard)
 
     def _put(self, arrivals: Arrivals, notes: list[tuple[str, str]]) -> None:
         """Into the queue, as far as there is room."""

@@ -303,6 +303,9 @@ def test_an_error_in_the_receiving_thread_reaches_the_one_who_drains(links: Call
         url = parse_url("udpin:127.0.0.1:1")
         patience_s = 0.01
 
+        def fileno(self) -> None:
+            pass
+
         def tend(self, now_ns: int) -> None:
             raise MemoryError("no more")
 
@@ -311,6 +314,6 @@ def test_an_error_in_the_receiving_thread_reaches_the_one_who_drains(links: Call
 
     receiver = Receiver([Broken()], [])  # type: ignore[list-item]
     receiver.start()
-    receiver.close()
     with pytest.raises(MemoryError):
-        receiver.drain()
+        Heard(receiver).until(lambda: False)
+    receiver.close()
