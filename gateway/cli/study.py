@@ -13,7 +13,10 @@ import typer
 
 from gateway.cli import options as take
 from gateway.cli.failures import UsageError
+from gateway.cli.many import wide_console
 from sim.studies import STUDIES, Study
+
+_LONGEST = 1000  # characters of a table's line
 
 _HELP = """
 Run a paper's experiment and show its table; its figures go into an .rrd for the viewer.
@@ -69,14 +72,15 @@ def _show(found: Study) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    console = Console(highlight=False)
+    console = wide_console()
     for each in found.tables:
         table = Table(box=None, padding=(0, 2, 0, 0), title=each.title, title_justify="left")
         for place, heading in enumerate(each.columns):
             table.add_column(heading, justify="right" if place else "left")
         for row in each.rows:
             table.add_row(*(_cell(cell) for cell in row))
-        console.print(table)
+        least = table.__rich_measure__(console, console.options.update(width=_LONGEST)).minimum
+        Console(highlight=False, width=max(console.width, least)).print(table)  # words that are cut cannot be read
         for note in each.notes:
             console.print(note, markup=False)
     if found.recording:

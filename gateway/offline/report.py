@@ -35,6 +35,7 @@ LEAST_S = 20  # on final: less is no approach
 APART_S = 30  # without being on final: the next one is another
 ROLLS_S = 120  # after the threshold, within which the touchdown is looked for
 _GAPS_TOO_LONG_S = 10.0
+_MEASURE = ("gps", "radar")  # dead reckoning is wanted only where the others give nothing
 _BETWEEN = 2  # rows, the fewest of which a gap can be told
 
 
@@ -251,9 +252,9 @@ def _grade(
     elif outside:
         reasons.append("the touchdown is not on the runway")
     reasons += [
-        f"{one.source} was silent for {one.longest_gap_s:.0f} s"
+        f"{one.source} gave the track nothing for {one.longest_gap_s:.0f} s"
         for one in sources
-        if one.longest_gap_s > _GAPS_TOO_LONG_S
+        if one.source in _MEASURE and one.longest_gap_s > _GAPS_TOO_LONG_S
     ]
     if accuracy is not None and min(accuracy.azimuth_within, accuracy.elevation_within) < 0.95:
         reasons.append("the track was off the truth by more than Annex 10 allows a precision radar")

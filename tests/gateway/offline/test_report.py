@@ -38,10 +38,10 @@ def _landing(above_m: float = 0.0, until_m: float = 0.0, level_m: float = 0.0, c
     return Flown(time, place, np.gradient(place, STEP_S, axis=0))
 
 
-def _judged(flown: Flown, true: Flown | None = None, silent: slice | None = None) -> Approach:
-    words = np.full(len(flown.time), "gps", dtype="U5")
+def _judged(flown: Flown, true: Flown | None = None, silent: slice | None = None, instead: str = "coast") -> Approach:
+    words = np.full(len(flown.time), "gps", dtype="U14")
     if silent is not None:
-        words[silent] = "coast"
+        words[silent] = instead
     heard = Heard(words, np.full(len(words), "fused"), np.full(len(words), 0.1), np.full(len(words), "1/2"))
     (found,) = approaches(DEMO_SITE, "mavlink:1", flown, heard, true)
     return found
@@ -99,11 +99,17 @@ def test_a_track_beside_the_truth_is_told_so() -> None:
     assert "the track was off the truth by more than Annex 10 allows a precision radar" in found.reasons
 
 
+def test_dead_reckoning_that_was_needed_for_a_while_is_no_silent_source() -> None:
+    found = _judged(_landing(), silent=slice(120, 180), instead="dead-reckoning")
+    assert [one.source for one in found.sources] == ["dead-reckoning", "gps"]
+    assert not any("dead-reckoning" in reason for reason in found.reasons)
+
+
 def test_a_source_that_is_silent_is_named() -> None:
     """Fifteen seconds of coasting."""
     found = _judged(_landing(), silent=slice(120, 180))
     assert found.sources[0].longest_gap_s == pytest.approx(15.25)
-    assert "gps was silent for 15 s" in found.reasons
+    assert "gps gave the track nothing for 15 s" in found.reasons
 
 
 def test_the_limits_are_those_of_annex_10() -> None:
