@@ -54,7 +54,7 @@ def learnt(minds: Minds, at: int, state: State, horizons_s: tuple[float, ...]) -
     worth = np.array([_every(one) / one for one in horizons_s[:LEARNT]])
     worth = np.concatenate([worth, np.zeros(LEARNT - len(worth))])
     slots = row, (foretold[:, 5] == 1.0).astype(np.int64), horizon
-    most = AT_MOST * _scale(minds.sigmas[row], minds.counted[row])[np.arange(len(row)), slots[1], horizon]
+    most = AT_MOST * _scale(minds.sigmas[row], minds.counted[row])[horizon, np.arange(len(row)), slots[1]]
     sigmas, counted = np.zeros(minds.sigmas.shape), np.zeros(minds.counted.shape)
     np.add.at(sigmas, slots, np.minimum(np.stack([along, across], axis=-1), most))
     np.add.at(counted, slots, 1.0)
@@ -72,18 +72,18 @@ def scaled(minds: Minds, spread: Spread, turns: Bools) -> Spread:
     """Sigmas (n, h) as the tracks' own past says they are; `turns` (n, h) where the way or the aircraft turns."""
     scale = _scale(minds.sigmas, minds.counted)
     slots = np.minimum(np.arange(turns.shape[1]), LEARNT - 1)
-    each = scale[np.arange(len(turns))[:, None], turns.astype(np.int64), slots]
+    each = scale[slots, np.arange(len(turns))[:, None], turns.astype(np.int64)]
     return Spread(spread.along * each[..., 0], spread.across * each[..., 1])
 
 
 def _scale(sigmas: Floats, counted: Floats) -> Floats:
-    """What sigmas are scaled by (n, 2, LEARNT, 2), of `Minds.sigmas` and `Minds.counted`."""
-    known, room = sigmas / USUAL, PRIOR + counted
+    """What sigmas are scaled by (LEARNT, n, 2, 2), of `Minds.sigmas` and `Minds.counted`."""
+    known, room = np.ascontiguousarray(np.moveaxis(sigmas, 2, 0)) / USUAL, PRIOR + np.moveaxis(counted, 2, 0)
     begins: Floats | float = PRIOR
     for horizon in range(LEARNT):
-        one = known[:, :, horizon]
+        one = known[horizon]
         one += begins
-        one /= room[:, :, horizon, None]
+        one /= room[horizon, ..., None]
         begins = PRIOR * np.sqrt(one)
     return np.asarray(np.minimum(np.maximum(known, LEAST), MOST))
 

@@ -30,10 +30,11 @@ CRUISE, LATE_A_TURN, LATE_IN_TURN, LATE_SLOWER, LATE_LANDED_S = 0.009, 0.056, 0.
 SOON_S = 6.0  # before a way's end: it flares, or turns aside onto a circle
 ROUND_S = 2.5  # half of the time in which it flies the radius of a circle that nobody says
 RESTS, ROUNDS, GOES_ANYWHERE = (0.4, 0.0), (0.25, 0.25), (1.2, 0.7)
-WANDERS_S, WANDERS_FOR_S, WANDERS_A_TURN = 0.034, 10.0, 0.0055
-GUSTS_ASIDE_S = 0.2  # for so long the root mean square of gusts carries it aside before it comes back
+WANDERS_S, WANDERS_FOR_S, WANDERS_A_TURN = 0.026, 3.0, 0.006
+AFTER_TURN, AFTER_FOR_S = 0.03, 60.0  # who is in a turn comes back to its line slowly
+LANDED_ASIDE_S = 0.07  # on the ground nothing brings it back to its line
 ROUND_WANDERS_S = 0.3
-SWINGS, SWINGS_NOW, SWINGS_FOR_S = 0.125, 0.5, 2.0
+SWINGS, SWINGS_NOW, SWINGS_FOR_S = 0.12, 0.45, 1.2
 ACCELERATES_S = 2.7  # who changes its speed goes on doing so for this long
 # of the mean square of gusts: how far off the speed that is kept is, and for how many seconds what comes lasts, twice
 CRUISE_OFF, GUST_LASTS_S = 1.2, 11.0
@@ -103,12 +104,15 @@ def spread(
     )
     late = (CRUISE * t) ** 2 + (LATE_A_TURN * turns_s) ** 2 + (LATE_IN_TURN * in_turn_s) ** 2
     soon = t > _ends_s(whole, t)[:, None] - SOON_S
-    late = late + (LATE_SLOWER * whole.slower_s[:, :h]) ** 2 + np.where(lands & soon, LATE_LANDED_S**2, 0.0)
+    landed = lands & soon
+    late = late + (LATE_SLOWER * whole.slower_s[:, :h]) ** 2 + np.where(landed, LATE_LANDED_S**2, 0.0)
     late = late + ends_along * ends_along
     wanders = WANDERS_S**2 * np.where(turned > ON_LINE_RAD, 1.0, 1.0 - np.exp(-t / WANDERS_FOR_S))
-    swings = (SWINGS * lately_s) ** 2 + (SWINGS_NOW * in_turn_s) ** 2 * np.exp(-t / SWINGS_FOR_S)
+    swings = SWINGS_NOW**2 * np.exp(-t / SWINGS_FOR_S) + AFTER_TURN**2 * np.exp(-t / AFTER_FOR_S)
+    swings = (SWINGS * lately_s) ** 2 + in_turn_s * in_turn_s * swings
     at_circle = ROUND_WANDERS_S**2 * heads_round[:, None]
     beside_s = wanders + at_circle + swings + (WANDERS_A_TURN * turns_s) ** 2 + ends_across * ends_across
+    beside_s = beside_s + np.where(landed, LANDED_ASIDE_S**2, 0.0)
     doubt = np.maximum(DOUBTED - np.where(np.isnan(confidence), DOUBTED, confidence), 0.0)[:, None]
     doubt = np.where(inferred[:, None], np.maximum(1.0 - or_zero(confidence), LEAST_DOUBT)[:, None], doubt)
     unknown = MANOEUVRES * speed * speed * np.where(by_model, 1.0, doubt) * t**3
@@ -119,7 +123,7 @@ def spread(
     )
     by_points = speed * speed * late + _of_wind(now, whole, t, wind_mps) + GUST_LASTS_S * now.gusts[:, None] * t
     along = place + gains * t * t + np.where(by_model, 0.0, by_points) + unknown / 6.0
-    off_line = speed * speed * beside_s + _to_side(whole, t) * late + GUSTS_ASIDE_S**2 * now.gusts[:, None]
+    off_line = speed * speed * beside_s + _to_side(whole, t) * late
     drifts = np.where(by_model, (now.speed_sigma[:, None] * t) ** 2, off_line)
     return Spread(np.sqrt(along), np.sqrt(place + drifts + unknown / 3.0))
 
