@@ -12,7 +12,7 @@ from gateway.align import SECOND, Fix, ReckonedFix
 from gateway.making import Making
 from gateway.observation import GpsReport, Heard, Many, Observation, VehicleStatus
 from gateway.picture import Event
-from gateway.reckon import NOTHING, Easing, LastPlace, Reckoned, reads
+from gateway.reckon import NOTHING, Easing, LastPlace, Reckoned, Reckoner, reads
 
 SURE_SIGMA = 6.0
 TURNED_MPS2 = 10.0  # the acceleration may have changed by so much since dead reckoning came so far
@@ -40,7 +40,9 @@ class Believing(Making):
         if not self.reckoners.denies(fix.aircraft, fix.at) and self._is_frozen(report, fix.at):
             return None
         expected = None
-        if fix.aircraft in self.reckoners.by_aircraft:
+        if fix.aircraft in self.consistency.contradicted:
+            self._begin_motion_anew(fix.aircraft)
+        elif fix.aircraft in self.reckoners.by_aircraft:
             self.reckoners = self.reckoners.placed(fix.aircraft, fix.at, self._place_of(fix, report))
             expected = self.reckoners.of(fix.aircraft, fix.at)
         if expected is None:
@@ -51,6 +53,13 @@ class Believing(Making):
             self.count("GPS reports that inertial data deny")
             return None
         return self._eased(fix, expected)
+
+    def _begin_motion_anew(self, aircraft: str) -> None:
+        """Dead reckoning has learnt from velocities that are known to be wrong: it begins again when they are right."""
+        if aircraft in self.reckoners.by_aircraft:
+            # It keeps its place: a share that is due later in the second names it.
+            vehicles = {**self.reckoners.by_aircraft, aircraft: Reckoner()}
+            self.reckoners = replace(self.reckoners, by_aircraft=vehicles)
 
     def _is_frozen(self, report: GpsReport, at: int) -> bool:
         """Whether a vehicle, of which nothing else tells how it moves, tells one place while its velocity says that it moves."""

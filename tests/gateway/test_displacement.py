@@ -15,9 +15,13 @@ from gateway.fuse.displacement import Displacements
 from gateway.fuse.events import NEVER, Event
 from gateway.fuse.evidence import Finding
 from gateway.fuse.scatter import Rows
+from gateway.observation import GpsReport
 from gateway.settings import PositionSource
+from sim.told_pictures import QUIET, errors_m, pictures, told
+from sim.told_rides import honest
 
 LEFT_OUT = ": its velocities are left out until they fit; put right what sends them"
+AXES = ("east", "north", "up")
 SWAPPED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 
 
@@ -147,7 +151,7 @@ def _half_as_fast(world: Any, ticks: str) -> Any:
         off = random.normal(0.0, 15.0, 3)
         speed = {"velocity_east_mps": east, "velocity_north_mps": north, "velocity_up_mps": up}
         reports.append(world.report(course, 5.0 * k, off_m=off, **speed))
-    return world.run(reports, ticks=ticks)
+    return world.run(reports, ticks=ticks, options=QUIET)
 
 
 def test_a_filter_leaves_out_velocities_that_are_known_to_be_wrong(world: Any) -> None:
@@ -165,6 +169,27 @@ def test_a_filter_leaves_out_velocities_that_are_known_to_be_wrong(world: Any) -
     assert one.displacements.sums.tobytes() == other.displacements.sums.tobytes()
     lanes = [next(iter(run.state.lanes.lanes.values())).last.mean.tobytes() for run in runs]
     assert lanes[0] == lanes[1]
+
+
+def test_positions_beside_wrong_velocities_are_not_denied_by_inertial_data() -> None:
+    """Dead reckoning that learnt from velocities in knots begins anew; until then it would refuse every good position."""
+    teller, said = told("aeroplane", honest)
+    in_knots = []
+    for one in said[:390]:
+        made = [
+            replace(each, **{f"velocity_{axis}_mps": 1.944 * getattr(each, f"velocity_{axis}_mps") for axis in AXES})
+            if isinstance(each, GpsReport)
+            else each
+            for each in one.observations
+        ]
+        in_knots.append(replace(one, observations=tuple(made)))
+    some = [picture for _, picture in pictures(in_knots)]
+    events = [event.text for picture in some for event in picture.events]
+    assert any("read as m/s: its velocities are left out" in text for text in events)
+    assert not any("it is not used" in text for text in events)
+    last = errors_m(teller, some)[-5:]
+    assert {by for _, by, _, _ in last} == {"gps"}
+    assert max(off for _, _, off, _ in last) < 25.0
 
 
 def test_what_is_known_of_aircraft_is_bounded() -> None:
