@@ -193,15 +193,15 @@ class Consistency:
     def _remembered(self, at: int) -> Consistency:
         """The same without sources that were not heard for long, or of too many."""
         displacements = self.displacements.remembered(at - FORGOTTEN_NS, NOISES_AT_MOST)
-        self = self if displacements is self.displacements else replace(self, displacements=displacements)
+        after = self if displacements is self.displacements else replace(self, displacements=displacements)
         keep = self.heard >= at - FORGOTTEN_NS
         if len(keep) > NOISES_AT_MOST:
             keep &= self.heard.argsort(kind="stable").argsort() >= len(keep) - NOISES_AT_MOST
         if keep.all():
-            return self
+            return after
         keys = [key for key, is_kept in zip(self.noises, keep.tolist(), strict=True) if is_kept]
         return replace(
-            self, noises={key: row for row, key in enumerate(keys)}, sums=self.sums[keep], heard=self.heard[keep]
+            after, noises={key: row for row, key in enumerate(keys)}, sums=self.sums[keep], heard=self.heard[keep]
         )
 
 

@@ -6,13 +6,16 @@ intervals between reports, whatever these are), level and upright on their own. 
 of how much likelier its displacement is if the velocities had nothing to do with it than if they were right, or if the
 positions stood still. It is summed like that on noise (`evidence`: a sum below nothing begins anew), beside the sums of a
 regression of the one displacement on the other, of which every leg has the same share: what the velocities are instead.
+
+Here positions are right and velocities are judged, of every aircraft and over minutes; `reckon.walking` judges positions by
+velocities that were theirs until now, over seconds.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TypeVar
 
 import numpy as np
@@ -77,13 +80,7 @@ class Displacements:
         return replace(
             self,
             aircraft={name: row for row, name in enumerate(names)},
-            heard=self.heard[keep],
-            since=self.since[keep],
-            start=self.start[keep],
-            variance=self.variance[keep],
-            told=self.told[keep],
-            slack=self.slack[keep],
-            sums=self.sums[keep],
+            **{one.name: getattr(self, one.name)[keep] for one in fields(self) if one.name != "aircraft"},
         )
 
     def _with(self, names: Sequence[str]) -> Displacements:
