@@ -27,7 +27,7 @@ airspeed, integrated from lift-off on, and closed onto where they ended; that te
 
 Positions are not used, but for where lift-off was, unless --with-gps ties the path to them; what was rebuilt is held against
 them where there are any. Accelerations (50 a second) tell how the wind changed. What a landing radar saw (a capture, a session)
-ties the path too, once it is told which of its plots are this aircraft's; --without-radar leaves it out.
+ties the path too; which plots are this aircraft's is found by the path. --without-radar leaves it out.
 
 Examples:
 
@@ -97,7 +97,7 @@ WithoutRadarOption = Annotated[
     bool, typer.Option("--without-radar", help="Do not tie the paths to what a landing radar saw.")
 ]
 ConstantWindOption = Annotated[
-    bool, typer.Option("--constant-wind", help="Close as printed, with one wind, whatever accelerations tell.")
+    bool, typer.Option("--constant-wind", help="Close as the paper does, with one wind, whatever accelerations tell.")
 ]
 
 
