@@ -12,7 +12,7 @@ from gateway.estimators.kalman import ERROR, POSITION
 from gateway.fuse import Lane
 from gateway.fusing import Fusing
 from gateway.picture import Event
-from gateway.reckon import DISAGREES, JUMPED, NOTHING, Reckoned
+from gateway.reckon import DISAGREES, JUMPED, NOTHING, Reckoned, Reckoners
 
 SERIAL = -2  # of what was not heard
 GPS_GONE_S = 3.0  # without a position for so long a radar shows dead reckoning where the vehicle is
@@ -41,7 +41,7 @@ class Reckoning(Fusing):
         self.reckoners = before.advanced(self.history, self.site.dead_reckoning)
         for aircraft in share.names:
             found = self.reckoners.of(aircraft, share.at)
-            self._tell_denied(aircraft, before.denied(aircraft), self.reckoners.denied(aircraft), now)
+            self._tell_denied(aircraft, before, share.at, now)
             lane = self.lanes.lanes.get(self.lanes.by_aircraft.get(aircraft, 0))
             if found is None or lane is None or not lane.events or lane.ended_at is not None:
                 continue
@@ -102,11 +102,16 @@ class Reckoning(Fusing):
             )
         self.once(text, "info", f"{found.aircraft}: walks")
 
-    def _tell_denied(self, aircraft: str, before: int, now: int, at: int) -> None:
-        if before == now:
+    def _tell_denied(self, aircraft: str, before: Reckoners, reckoned_at: int, at: int) -> None:
+        now = self.reckoners.denied(aircraft)
+        if before.denied(aircraft) == now:
             return
         if now == NOTHING:
-            self.events.append(Event(at, "info", f"{aircraft}: what it says of its position agrees again, and is used"))
+            known, sure = before.of(aircraft, reckoned_at), ""
+            if known is not None:  # what walked off so slowly agrees some time because little is known by then
+                sure = f" with where it is known to be, within {3.0 * known.level_sigma_m:.0f} m"
+            text = f"{aircraft}: what it says of its position agrees again{sure}, and is used"
+            self.events.append(Event(at, "info", text))
             return
         how = "jumped" if now == JUMPED else "walks off slowly"
         what = "its own velocities" if now == DISAGREES else self.reckoners.by(aircraft).words

@@ -17,8 +17,9 @@ from gateway.observation import AirData, Attitude, Heard, ImuSample, Many, Obser
 from gateway.picture import Picture
 from gateway.reckon.flying import carried_by
 from gateway.reckon.kinds import By
+from gateway.reckon.told import ATTITUDE, INERTIAL, Series, Told
 from sim.studies.without_unit import simulated, windows
-from sim.told_pictures import FALSE_FROM_S, QUIET, SECOND, START, errors_m, goes_away, pictures, told
+from sim.told_pictures import FALSE_FROM_S, QUIET, SECOND, START, denials, errors_m, goes_away, pictures, told
 from sim.told_rides import Teller, honest
 
 HEARD_FROM = START + (FALSE_FROM_S - 20.0) * SECOND
@@ -91,6 +92,39 @@ def test_good_positions_are_not_refused_and_no_track_is_changed() -> None:
         for options in (QUIET, replace(QUIET, dead_reckoning="off"))
     )
     assert [one.fuse.covariance.tobytes() for one in on] == [one.fuse.covariance.tobytes() for one in off]
+
+
+def test_a_unit_that_tells_about_three_times_a_second_does_not_come_and_go() -> None:
+    """A copter without one keeps on without until it tells four a second; one with a unit keeps it down to three."""
+    lies = Series(START + np.arange(0, 12 * SECOND, SECOND // 2), np.tile([1.0, 0.0, 0.0, 0.0], (24, 1)))
+
+    def carried(hz: float, until_now: By) -> By:
+        at = START + np.round(np.arange(0.0, 12.0, 1.0 / hz) * SECOND).astype(np.int64)
+        told = Told().with_more({ATTITUDE: lies, INERTIAL: Series(at, np.ones((len(at), 7)))})
+        return carried_by(told, 2, until_now)
+
+    assert [carried(hz, By.TILT) for hz in (2.5, 3.4, 4.5)] == [By.TILT, By.TILT, By.UNIT]
+    assert [carried(hz, By.UNIT) for hz in (2.5, 3.4, 4.5)] == [By.TILT, By.UNIT, By.UNIT]
+
+
+def test_what_is_known_of_a_source_outlasts_a_pause_of_what_carries_on() -> None:
+    """Attitudes that pause for four seconds end dead reckoning: a walk that goes on then is refused ten seconds later."""
+
+    def pausing(each: Observation) -> Observation | None:
+        if isinstance(each, Attitude) and 28.0 < (each.valid_at - START) / SECOND < 32.0:
+            return None
+        return without_unit(each)
+
+    _, said = said_by("car", walks_off_silently, pausing)
+    (since_s, word), *_ = denials(picture for _, picture in pictures(one for one in said if one.now < OVER))
+    assert word == "denied"
+    assert 4.0 < since_s <= 12.0
+
+
+def walks_off_silently(time_s: float) -> tuple[float, float, float, float]:
+    """2 m/s, and its velocities say nothing of it."""
+    gone_s = max(time_s - FALSE_FROM_S, 0.0)
+    return 1.2 * gone_s, 1.6 * gone_s, 0.0, 0.0
 
 
 @pytest.mark.study
