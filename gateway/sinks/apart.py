@@ -7,6 +7,7 @@ process of its own it holds up no picture and no datagram, and where there is on
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import pickle
 import subprocess
@@ -32,6 +33,34 @@ _ATTITUDE_NS = 20_000_000  # of one aircraft: a symbol that turns 50 times a sec
 _DRAWN = GpsReport | RadarPlot | FlightPlan | Intent | WeatherArea
 
 
+class Gathered:
+    """Pictures that wait to be handed over, each pickled as it comes: many at once would hold the interpreter for long.
+
+    What they share, such as names and what stays the same from step to step, is written once.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._content = io.BytesIO()
+        self._pickler = pickle.Pickler(self._content, pickle.HIGHEST_PROTOCOL)
+
+    def add(self, picture: Picture) -> None:
+        """One more."""
+        self._pickler.dump(picture)
+        self.count += 1
+
+    @property
+    def content(self) -> bytes:
+        """As `pictures` reads it."""
+        return self._content.getvalue()
+
+
+def pictures(count: int, content: bytes) -> list[Picture]:
+    """What was gathered."""
+    unpickler = pickle.Unpickler(io.BytesIO(content))
+    return [unpickler.load() for _ in range(count)]
+
+
 class Apart:
     """Draws pictures in another process: see `gateway.sinks.rerun.RerunSink`, whose arguments these are.
 
@@ -44,7 +73,7 @@ class Apart:
         if serve is not None:
             serve = serve[0], free_port(*serve)
         self._path = path
-        self._gathered: list[bytes] = []  # each pickled by itself: many at once would hold the interpreter for long
+        self._gathered = Gathered()
         self._since: int | None = None
         self._health_at: int | None = None
         self._attitude_at: dict[str, int] = {}
@@ -68,11 +97,11 @@ class Apart:
 
     def write(self, picture: Picture) -> None:
         """Take one picture; raises OSError for what became of those before."""
-        self._gathered.append(pickle.dumps(self._as_drawn(picture), pickle.HIGHEST_PROTOCOL))
+        self._gathered.add(self._as_drawn(picture))
         if self._since is None:
             self._since = picture.now
         waited = picture.now - self._since
-        if not 0 <= waited < _GATHERED_NS or len(self._gathered) >= _GATHERED_AT_MOST:
+        if not 0 <= waited < _GATHERED_NS or self._gathered.count >= _GATHERED_AT_MOST:
             self._hand_over()
             self._since = picture.now
 
@@ -123,9 +152,9 @@ class Apart:
         return True
 
     def _hand_over(self) -> None:
-        gathered, self._gathered = self._gathered, []
-        if gathered:
-            self._tell("write_all", gathered)
+        gathered, self._gathered = self._gathered, Gathered()
+        if gathered.count:
+            self._tell("write_all", gathered.count, gathered.content)
 
     def _tell(self, what: str, *about: Any) -> None:
         """Ask the process to do something, once it has answered for all before."""

@@ -15,7 +15,7 @@ import signal
 import sys
 from typing import Any, BinaryIO
 
-from gateway.sinks.apart import SIZE_BYTES
+from gateway.sinks.apart import SIZE_BYTES, pictures
 from gateway.sinks.rerun import RerunSink
 
 _NICENESS = 10  # where there is one core only, pictures are made first and drawn afterwards
@@ -56,8 +56,7 @@ def draw(source: BinaryIO, target: BinaryIO) -> None:
                 sink = RerunSink(site, **arguments)
             elif what == "write_all":
                 assert sink is not None
-                (gathered,) = about
-                sink.write_all([pickle.loads(picture) for picture in gathered])
+                sink.write_all(pictures(*about))
             else:
                 getattr(sink, what)(*about)
             _answer(target, sink)

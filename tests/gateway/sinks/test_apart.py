@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 import resource
 import signal
 import socket
@@ -17,6 +16,7 @@ import pytest
 from gateway.observation import Attitude
 from gateway.picture import Picture
 from gateway.settings import DEMO_SITE
+from gateway.sinks import apart as apart_module
 from gateway.sinks.apart import Apart
 from gateway.sinks.hold import is_held
 from gateway.sinks.rerun import RerunSink
@@ -81,7 +81,7 @@ def test_of_attitudes_that_come_thick_fifty_a_second_of_each_aircraft_are_carrie
     monkeypatch.setattr(
         Apart,
         "_tell",
-        lambda self, what, *about: carried.extend(map(pickle.loads, about[0] if what == "write_all" else ())),
+        lambda self, what, *about: carried.extend(apart_module.pictures(*about) if what == "write_all" else ()),
     )
     sink = Apart(DEMO_SITE, path=None, serve=None)
     made = pictures(1.0)[0]
