@@ -89,7 +89,7 @@ def test_what_dead_reckoning_found_is_among_a_vehicles_readings_until_it_is_old(
     (vehicle,) = first.health.vehicles
     sigma, wind = np.array([3.0, 3.0, 5.0]), np.array([0.0, -4.0])
     place = (vehicle.aircraft, first.now, 0.7, 0.2, 600.0, np.zeros(3), sigma, np.ones(3))
-    found = Reckoned(*place, wind, 1.0, NOTHING, first.now, True, 0.0)
+    found = Reckoned(*place, wind, 1.0, NOTHING, first.now, 1.5, True, 0.0)
     scene = HealthScene()
     scene.entries([replace(first, reckoned=(found,))])
     (table,) = scene._tables[VEHICLES].split("\n\n")
