@@ -141,12 +141,8 @@ def simulate(
             raise UsageError(f"The scene {scene} has no file to show; talkdown simulate --help says what it takes.")
         show_scene(scene)
         return
-    pace, settings, seed, archive = (
-        read_speed(playing.speed, 1.0),
-        changes.settings or [],
-        changes.seed,
-        playing.archive,
-    )
+    pace, settings = read_speed(playing.speed, 1.0), changes.settings or []
+    seed, archive = changes.seed, playing.archive
     _check_belonging(scene, wanted, changes.watch, settings, archive)
     if scene == "helmsman":
         from gateway.cli.helmsman import steer_a_ship

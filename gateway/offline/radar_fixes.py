@@ -47,9 +47,8 @@ class Seen:
     known: Known
     used: int
     of: int
-    place_m: Floats = field(
-        default_factory=lambda: np.zeros((0, 3))
-    )  # (k, 3) those with range and azimuth, from lift-off
+    # (k, 3) those with range and azimuth: east, north, up of lift-off
+    place_m: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     tracks: tuple[str, ...] = ()
     doubt: str | None = None
 
