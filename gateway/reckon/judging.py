@@ -37,6 +37,7 @@ Bools = NDArray[np.bool_]
 
 FAR = 43.6  # chi-square of four degrees, passed once in 10^8: ten hours have 72 000 positions
 WALKED = 33.4  # once in 10^6: they have 7200 hypotheses
+UNHELD = 3.0  # times as much where nothing holds the velocity: gusts are rarer and stronger than any sigma says
 NEAR = 13.3  # once in a hundred
 AGREES_FOR = 10  # positions in a row, half a second apart, until one that was refused is believed
 TRUSTED_AFTER = 30 * SECOND_CELLS  # since it began: before that it has not learnt its own errors
@@ -67,7 +68,7 @@ def judged(tip: Tip, place: Floats, late_s: Floats, held: Bools, unseen: Floats,
     trusted = (tip.cell - tip.began >= TRUSTED_AFTER) & refuses
     jumps = trusted & (worst[:, 0] > FAR)
     old = tip.cell[:, None] - tip.seeded[:, 1:] >= OLD_ENOUGH
-    bound = np.where(held, WALKED, WALKED * np.maximum(tip.times, 1.0))
+    bound = np.where(held, WALKED, UNHELD * WALKED * np.maximum(tip.times, 1.0))
     walks = (trusted & (held | is_proved(tip)))[:, None] & old & (worst[:, 1:] > bound[:, None])
     disagrees = walks_away(tip, square) & refuses
     refused = tip.denied != NOTHING
