@@ -192,7 +192,7 @@ class Consistency:
 
     def _remembered(self, at: int) -> Consistency:
         """The same without sources that were not heard for long, or of too many."""
-        displacements = self.displacements.remembered(at - FORGOTTEN_NS, NOISES_AT_MOST)
+        displacements = self.displacements.remembered(at, at - FORGOTTEN_NS, NOISES_AT_MOST)
         after = self if displacements is self.displacements else replace(self, displacements=displacements)
         keep = self.heard >= at - FORGOTTEN_NS
         if len(keep) > NOISES_AT_MOST:

@@ -69,9 +69,12 @@ class Displacements:
         known = replace(known, heard=heard)._walked(rows, first, last, place)
         return known._judged(rows, last, place)
 
-    def remembered(self, since: int, most: int) -> Displacements:
-        """The same without aircraft that were not heard since, or the least lately heard of too many."""
-        keep = self.heard >= since
+    def remembered(self, at: int, since: int, most: int) -> Displacements:
+        """The same without aircraft that were not heard since, or the least lately heard of too many.
+
+        Who has ended no leg yet has nothing to be remembered by once his leg is broken off.
+        """
+        keep = self.heard >= np.where(self.sums[:, :, LEGS].any(axis=1), since, at - int(GAP_S * SECOND))
         if len(keep) > most:
             keep &= self.heard.argsort(kind="stable").argsort() >= len(keep) - most
         if keep.all():

@@ -193,14 +193,16 @@ def test_positions_beside_wrong_velocities_are_not_denied_by_inertial_data() -> 
 
 
 def test_what_is_known_of_aircraft_is_bounded() -> None:
-    """The least lately heard of too many are forgotten, and those not heard for long."""
+    """The least lately heard of too many are forgotten, those not heard for long, and soon those of which nothing is known."""
     names, count = [f"a{k}" for k in range(12)], 12
     rows = Rows(
         np.arange(count), np.arange(count) * SECOND, np.zeros((count, 6)), np.ones((count, 6)), np.zeros(count), np.arange(count)
     )  # fmt: skip
     known = Displacements().after(rows, names)
-    assert list(known.remembered(0, 10).aircraft) == names[2:]
-    kept = known.remembered(9 * SECOND, 10)
+    assert not known.remembered(60 * SECOND, 0, 10).aircraft
+    known = replace(known, sums=known.sums + 1.0)
+    assert list(known.remembered(60 * SECOND, 0, 10).aircraft) == names[2:]
+    kept = known.remembered(60 * SECOND, 9 * SECOND, 10)
     assert list(kept.aircraft) == names[9:]
     assert kept.heard.tolist() == [9 * SECOND, 10 * SECOND, 11 * SECOND]
     assert len(kept.sums) == len(kept.start) == 3
