@@ -113,8 +113,10 @@ class Reckoning(Fusing):
             text = f"{aircraft}: what it says of its position agrees again{sure}, and is used"
             self.events.append(Event(at, "info", text))
             return
-        how = "jumped" if now == JUMPED else "walks off slowly"
-        what = "its own velocities" if now == DISAGREES else self.reckoners.by(aircraft).words
-        text = f"{aircraft}: what it says of its position {how}, which {what} deny: it is not used"
+        by = self.reckoners.by(aircraft).words
+        how = f"jumped, which {by} deny" if now == JUMPED else f"walks off slowly, which {by} deny"
+        if now == DISAGREES:
+            how = "is not where its own velocities lead"
+        text = f"{aircraft}: what it says of its position {how}: it is not used"
         self.count("position sources denied")
         self.events.append(Event(at, "warning", text))
