@@ -25,9 +25,10 @@ _HELP = """
 Rebuild the flights of a recording from what its aircraft said of airspeed, attitude and pressure. Sorties are found by
 airspeed, integrated from lift-off on, and closed onto where they ended; that tells the wind (paper 002-2).
 
-Positions are not used, but for where lift-off was, unless --with-gps ties the path to them; what was rebuilt is held against
-them where there are any. Accelerations (50 a second) tell how the wind changed. What a landing radar saw (a capture, a session)
-ties the path too; which plots are this aircraft's is found by the path. --without-radar leaves it out.
+Positions are not used, but for where lift-off was, and touchdown if that was elsewhere, unless --with-gps ties the path to
+them; what was rebuilt is held against them where there are any. Accelerations (50 a second) tell how the wind changed. What a
+landing radar saw (a capture, a session) ties the path too; which plots are this aircraft's is found by the path.
+--without-radar leaves it out.
 
 Examples:
 
@@ -45,11 +46,13 @@ Examples:
 """
 
 CloseOption = Annotated[
-    str,
+    str | None,
     typer.Option(
         "--close-on",
         metavar="lift-off|threshold|nothing|LAT,LON",
-        help="Where every sortie ended: where it lifted off; the site's landing threshold; a place; or nobody knows.",
+        help="Where every sortie ended: where it lifted off; the site's landing threshold; a place; or nobody knows. "
+        "(default: where it lifted off, or where its positions say it touched down, if that is elsewhere)",
+        show_default=False,
     ),
 ]
 LiftOffOption = Annotated[
@@ -86,7 +89,8 @@ RunwayOption = Annotated[
     typer.Option(
         "--runway-direction",
         metavar="DEGREES",
-        help="True direction of the runway, either way: tells the heading's constant error. (default: the site's)",
+        help="True direction of the runway, either way: tells the heading's constant error. "
+        "(default: the site's, for flights that lifted off there)",
         show_default=False,
     ),
 ]
@@ -109,7 +113,7 @@ def register(app: typer.Typer) -> None:
 def reconstruct(
     files: FilesArgument,
     site: take.SiteOption = None,
-    close_on: CloseOption = "lift-off",
+    close_on: CloseOption = None,
     lift_off: LiftOffOption = None,
     take_off_speed: TakeOffOption = None,
     landing_speed: LandingOption = None,
@@ -153,7 +157,7 @@ def _how(
     take_off_mps: float | None,
     landing_mps: float | None,
     lift_off: str | None,
-    close_on: str,
+    close_on: str | None,
     runway_deg: float | None,
     place: SitePlace | None,
 ) -> How:
@@ -162,18 +166,18 @@ def _how(
 
     if take_off_mps is not None and landing_mps is not None and landing_mps >= take_off_mps:
         raise UsageError("The landing speed must be below the take-off speed, or a sortie would end as it begins.")
-    direction = None if place is None else place.site.runway.landing_compass_rad
-    close: Place | str = close_on
+    runway = None if place is None else place.site.runway
+    close: Place | str | None = close_on
     if close_on == "threshold":
         close = _threshold(place)
-    elif close_on not in ("lift-off", "nothing"):
+    elif close_on is not None and close_on not in ("lift-off", "nothing"):
         close = _read_place(close_on, "--close-on", "lift-off, threshold, nothing, or ")
     return How(
         take_off_mps,
         landing_mps,
         None if lift_off is None else _read_place(lift_off, "--lift-off"),
         close,
-        direction if runway_deg is None else math.radians(runway_deg),
+        runway if runway_deg is None else math.radians(runway_deg),
     )
 
 
@@ -223,7 +227,8 @@ def _muted(playback: Playback, mutes: list[str] | None) -> tuple[Muted, tuple[tu
 def _rebuilt(playback: Playback, how: How, around: Around, quiet: bool) -> dict[str, list[Sortie]]:
     """Every sortie of every aircraft. Raises FileError, FolderError, RunError where there is nothing to rebuild."""
     from gateway.cli.progress import progressing
-    from gateway.offline.reconstruction import Unplaced, Unreachable, reconstructed
+    from gateway.offline.ends import Unplaced, Unreachable
+    from gateway.offline.reconstruction import reconstructed
     from gateway.runtime.flights import radar_tracks, radar_views, read_recorded
 
     with progressing("reading", show=not quiet) as tell:

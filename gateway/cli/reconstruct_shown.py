@@ -58,6 +58,7 @@ def _notes(sortie: Sortie) -> list[str]:
     if not math.isnan(sortie.heading_bias_rad):
         bias, sigma = (math.degrees(one) for one in (sortie.heading_bias_rad, sortie.heading_bias_sigma_rad))
         notes.append(f"on the take-off roll the heading showed {bias:+.1f} +- {sigma:.1f} degrees; it was taken off.")
+    notes.extend(sortie.doubts)
     if sortie.fixes:
         notes.append(f"tied to {sortie.fixes} positions; 1 sigma at worst {sortie.sigma_m.max():.0f} m an axis.")
     if sortie.by_accelerations:

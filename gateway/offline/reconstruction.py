@@ -25,29 +25,21 @@ from gateway.offline.carrying import (
     evidence_of,
     fixes_of,
     frame_at,
-    level_m,
     on_plane,
     together,
     tying,
 )
 from gateway.offline.compared import Compared, compared_with
+from gateway.offline.ends import Closing, closing, roll_along
 from gateway.offline.parameters import Flown, Parameters, Times
 from gateway.offline.radar_fixes import Seen, Way, seen
 from gateway.offline.sightings import View, seen_within
+from gateway.settings import Runway
 
 Floats = NDArray[np.float64]
 
 # Of the cruising speed: what most fixed-wing aircraft lift off and touch down at.
 TAKE_OFF_SHARE, LANDING_SHARE = 0.6, 0.45
-_STRONGEST_MPS = 100.0  # no wind that small aircraft fly in is stronger, and few jet streams
-
-
-class Unplaced(ValueError):
-    """A path should be closed on a place, and nothing tells where it began; the message is part of a sentence."""
-
-
-class Unreachable(ValueError):
-    """A path should end at a place to which no wind would have carried it; the message is a sentence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +49,12 @@ class How:
     take_off_mps: float | None = None
     landing_mps: float | None = None
     lift_off: Place | None = None  # where; None: the position that was told nearest to it
-    close_on: Place | str = "lift-off"  # "lift-off", "nothing", or a place
-    runway_compass_rad: float | None = None  # with one the heading's constant error is found on the take-off roll
+    close_on: Place | str | None = (
+        None  # "lift-off", "nothing", a place; None: lift-off, or the touchdown that was told elsewhere
+    )
+    runway: Runway | float | None = (
+        None  # or its direction, rad: the heading's constant error is found on the take-off roll
+    )
     fixes: bool = False  # whether positions tie the path
     inertial: bool = True  # whether accelerations tell how the wind changed, where they are told
     muted: Muted = ()  # positions of these times tie nothing
@@ -79,6 +75,7 @@ class Sortie:
     pitch_rad: Floats
     compass_rad: Floats  # with its constant error taken off
     true_airspeed_mps: Floats
+    closed_on: str  # "lift-off", "touchdown" (as positions told it), "place", "nothing"
     end_error_m: float  # of the open path, from where it should have ended; NaN where nothing tells
     heading_bias_rad: float
     heading_bias_sigma_rad: float
@@ -90,6 +87,7 @@ class Sortie:
     fixes: int
     by_accelerations: bool  # whether they told how the wind changed
     radar: Seen | None  # which plots tie the path; None: no radar saw anything, or it was not asked
+    doubts: tuple[str, ...]  # sentences: what speaks against the runway and the end that were taken
 
     @property
     def geodetic_deg(self) -> Floats | None:
@@ -162,8 +160,9 @@ def _sortie(flown: Flown, first: int, end: int, take_off_mps: float, beside: _Be
     places = beside.places
     part, took_off, landed = slice(first, end + 1), first > 0, end < len(flown.time) - 1
     time, time_s = flown.time[part], (flown.time[part] - flown.time[first]) * 1e-9
-    bias = _heading_bias(flown, first, take_off_mps, how.runway_compass_rad)
-    compass = flown.compass_rad[part] - (0.0 if math.isnan(bias[0]) else bias[0])
+    lift_off = how.lift_off or _nearest_place(places, int(time[0]))
+    rolled = roll_along(flown, first, take_off_mps, how.runway, lift_off)
+    compass = flown.compass_rad[part] - (0.0 if math.isnan(rolled.bias_rad) else rolled.bias_rad)
     pressure, height, height_by = _heights(flown, part)
     speed = paths.true_airspeed(flown.airspeed_mps[part], pressure, flown.temperature_k[part])
     pitch, roll = flown.pitch_rad[part], flown.roll_rad[part]
@@ -171,20 +170,20 @@ def _sortie(flown: Flown, first: int, end: int, take_off_mps: float, beside: _Be
     if height is not None:
         attack = paths.attack_by_height(time_s, height, speed, pitch, roll)
         velocity[:, :2] = paths.air_velocity(speed, compass, pitch, roll, attack)[:, :2]
-    lift_off = how.lift_off or _nearest_place(places, int(time[0]))
     through_air = (
         paths.integrated(time_s, velocity) if lift_off is None else paths.on_earth(time_s, velocity, lift_off[0])
     )
     if height is None:
         height = through_air[:, 2]
-    knows_its_end = landed and (took_off or how.close_on != "lift-off")
-    target = _target(how.close_on, lift_off) if knows_its_end else None
-    if target is not None:
-        _check_reachable(target, through_air[-1, :2], float(time_s[-1]))
+    end_is = Closing("nothing", None)
+    if landed and (took_off or how.close_on not in (None, "lift-off")):
+        touchdown = _nearest_place(places, int(time[-1]))
+        end_is = closing(how.close_on, through_air[:, :2], float(time_s[-1]), lift_off, touchdown)
+    target = end_is.target_m
     fixes = fixes_of(places, time, lift_off, how.muted) if how.fixes and lift_off is not None else None
     positions = 0 if fixes is None else len(fixes.time_s) // 2
     evidence = None if beside.felt is None else evidence_of(beside.felt, time_s, velocity[:, :2], lift_off)
-    usual_end = isinstance(how.close_on, str)
+    usual_end = how.close_on is None or isinstance(how.close_on, str)
     radar = None
     if beside.views and lift_off is not None:
         sure = together(fixes, None if usual_end or target is None else ending(time_s, target))
@@ -192,6 +191,8 @@ def _sortie(flown: Flown, first: int, end: int, take_off_mps: float, beside: _Be
         plots = seen_within(beside.views, int(time[0]), int(time[-1]), how.radars_muted)
         radar = seen(way, plots, beside.radar_tracks, tying(time_s, through_air[:, :2], sure, evidence))
         fixes = together(fixes, radar.known if radar.used else None)
+    if usual_end and fixes is not None:
+        end_is = Closing("nothing", None)
     found = carried(time_s, through_air[:, :2], target, fixes, evidence, usual_end)
     return Sortie(
         time=time,
@@ -204,9 +205,10 @@ def _sortie(flown: Flown, first: int, end: int, take_off_mps: float, beside: _Be
         pitch_rad=pitch,
         compass_rad=compass,
         true_airspeed_mps=speed,
+        closed_on=end_is.on,
         end_error_m=math.nan if target is None else float(np.linalg.norm(through_air[-1, :2] - target)),
-        heading_bias_rad=bias[0],
-        heading_bias_sigma_rad=bias[1],
+        heading_bias_rad=rolled.bias_rad,
+        heading_bias_sigma_rad=rolled.sigma_rad,
         lift_off=lift_off,
         height_by=height_by,
         took_off=took_off,
@@ -215,39 +217,8 @@ def _sortie(flown: Flown, first: int, end: int, take_off_mps: float, beside: _Be
         fixes=positions,
         by_accelerations=evidence is not None and isinstance(found, Tied),
         radar=radar,
+        doubts=tuple(one for one in (rolled.doubt, end_is.doubt) if one is not None),
     )
-
-
-def _target(close_on: Place | str, lift_off: Place | None) -> Floats | None:
-    """Where the path ends, east and north of lift-off, m; None: nobody says. Raises Unplaced."""
-    if close_on == "nothing":
-        return None
-    if isinstance(close_on, str):
-        return np.zeros(2)
-    if lift_off is None:
-        raise Unplaced("no position tells where it lifted off, so a path cannot be closed on a place")
-    return np.asarray(level_m(np.array([close_on[0]]), np.array([close_on[1]]), lift_off)[0])
-
-
-def _check_reachable(target_m: Floats, ended_m: Floats, lasted_s: float) -> None:
-    """Raises Unreachable."""
-    wind = float(np.linalg.norm(target_m - ended_m)) / lasted_s
-    if wind > _STRONGEST_MPS:
-        raise Unreachable(
-            f"To end {np.linalg.norm(target_m) / 1000.0:.0f} km from where it lifted off, it would have been carried by "
-            f"a wind of {wind:.0f} m/s: --close-on or --lift-off is not the place."
-        )
-
-
-def _heading_bias(
-    flown: Flown, first: int, take_off_mps: float, runway_compass_rad: float | None
-) -> tuple[float, float]:
-    """Of the roll in the minute before lift-off."""
-    if runway_compass_rad is None:
-        return math.nan, math.nan
-    since = int(np.searchsorted(flown.time, flown.time[first] - 60 * SECOND))
-    roll = slice(since, first)
-    return paths.heading_bias(flown.compass_rad[roll], flown.airspeed_mps[roll], take_off_mps, runway_compass_rad)
 
 
 def _heights(flown: Flown, part: slice) -> tuple[Floats, Floats | None, str]:

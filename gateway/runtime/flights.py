@@ -158,6 +158,7 @@ def _told(sortie: Sortie) -> dict[str, Any]:
         "duration_s": sortie.duration_s,
         "length_m": sortie.length_m,
         "lift_off_deg": None if sortie.lift_off is None else [math.degrees(angle) for angle in sortie.lift_off],
+        "closed_on": sortie.closed_on,
         "end_error_m": sortie.end_error_m,
         "wind_east_mps": float(wind[0]),
         "wind_north_mps": float(wind[1]),
@@ -166,6 +167,7 @@ def _told(sortie: Sortie) -> dict[str, Any]:
         "height_by": sortie.height_by,
         "fixes": sortie.fixes,
         "by_accelerations": sortie.by_accelerations,
+        "doubts": list(sortie.doubts),
     }
     if (radar := sortie.radar) is not None:
         told["radar"] = {

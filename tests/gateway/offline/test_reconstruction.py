@@ -10,8 +10,10 @@ import pytest
 
 from gateway.estimators.flight_path import standard_pressure
 from gateway.observation import AirData, Attitude, GpsReport, Observation
-from gateway.offline.parameters import Parameters
-from gateway.offline.reconstruction import How, Sortie, Unplaced, Unreachable, reconstructed
+from gateway.offline.ends import Unplaced, Unreachable, closing, roll_along
+from gateway.offline.parameters import Flown, Parameters
+from gateway.offline.reconstruction import How, Sortie, reconstructed
+from gateway.settings import Runway
 
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND
@@ -110,6 +112,61 @@ def test_without_positions_the_path_is_in_metres_from_lift_off() -> None:
     told = _only(_gathered(positions=False), How(lift_off=LIFT_OFF, close_on=_end()))
     assert told.geodetic_deg is not None
     np.testing.assert_allclose(np.radians(told.geodetic_deg[-1]), _end(), atol=1e-8)
+
+
+def test_a_flight_that_lands_elsewhere_is_closed_on_where_positions_say_it_touched_down() -> None:
+    """Unless lift-off was asked for; either way a sentence says how far away it was. Beside its lift-off that is no matter."""
+    told = _only(_gathered(), How())
+    assert told.compared is not None
+    assert told.closed_on == "touchdown"
+    assert told.compared.rmse_m < 10.0
+    assert "touched down 2.0 km from where it lifted off: the path is closed on where" in told.doubts[0]
+    asked = _only(_gathered(), How(close_on="lift-off"))
+    assert np.abs(asked.path_m[-1]).max() < 1e-6
+    assert "touched down 2.0 km from where it lifted off, and the path is closed on lift-off" in asked.doubts[0]
+    circle = np.array([[0.0, 0.0], [5000.0, 0.0], [0.0, 10.0]])
+    beside = LIFT_OFF[0] + 290.0 / METRES_A_RADIAN, LIFT_OFF[1]
+    near = closing(None, circle, 400.0, LIFT_OFF, beside)
+    assert (near.on, near.doubt) == ("lift-off", None)
+
+
+def test_closing_that_takes_a_way_for_wind_is_doubted() -> None:
+    """Straight on at 25 m/s and no position at the end; a path that returns half of its way is not."""
+    straight = closing(None, np.array([[0.0, 0.0], [10_000.0, 0.0]]), 400.0, LIFT_OFF, None)
+    assert straight.doubt is not None
+    assert "a wind of 25 m/s at an airspeed of 25 m/s: it probably ended elsewhere" in straight.doubt
+    assert closing(None, np.array([[0.0, 0.0], [7000.0, 0.0], [4000.0, 0.0]]), 400.0, LIFT_OFF, None).doubt is None
+
+
+@pytest.mark.parametrize(
+    ("kilometres", "degrees", "said"),
+    [
+        (1.0, 5.0, None),
+        (20.0, 5.0, "20.0 km from the site's runway"),
+        (None, 5.0, "nothing tells whether"),
+        (1.0, 62.0, "62 degrees across"),
+    ],
+)
+def test_a_runway_tells_of_the_heading_only_where_the_flight_lifted_off_from_it(
+    kilometres: float | None, degrees: float, said: str | None
+) -> None:
+    """Within a kilometre of its ends, and along it; a direction that was given is believed whatever it is."""
+    time = START + np.arange(20) * SECOND
+    speed, compass = np.linspace(1.0, 20.0, 20), np.full(20, math.radians(90.0 + degrees))
+    none = np.full(20, math.nan)
+    flown = Flown(time, speed, none, none, compass, none, none, none)
+    runway = Runway(*LIFT_OFF, height_m=0.0, landing_compass_rad=math.radians(270.0), length_m=1000.0)
+    lift_off = None if kilometres is None else (LIFT_OFF[0] + kilometres * 1000.0 / METRES_A_RADIAN, LIFT_OFF[1])
+    rolled = roll_along(flown, 19, 20.0, runway, lift_off)
+    if said is None:
+        assert rolled.doubt is None
+        assert rolled.bias_rad == pytest.approx(math.radians(degrees))
+    else:
+        assert rolled.doubt is not None
+        assert said in rolled.doubt
+        assert math.isnan(rolled.bias_rad)
+    given = roll_along(flown, 19, 20.0, math.radians(90.0), lift_off)
+    assert given.bias_rad == pytest.approx(math.radians(degrees))
 
 
 def test_a_place_that_no_wind_reaches_is_refused() -> None:
