@@ -120,7 +120,8 @@ def sessions_of(paths: Sequence[Path], crew: Crew) -> list[Path] | None:
         return None
     for path in paths:
         if not path.is_dir():
-            raise UsageError(f"{path} is no session: it is no folder.")
+            is_file = path.exists()
+            raise UsageError(f"{path} is no session: it is no folder." if is_file else f"There is no folder {path}.")
     return expanded(paths, crew)
 
 

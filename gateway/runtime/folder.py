@@ -134,6 +134,8 @@ def read_record(folder: Path) -> Record:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
+        if not folder.exists():
+            raise FolderError(f"There is no folder {folder}.") from error
         raise FolderError(f"{folder} is no session: it has no {SESSION_FILE}.") from error
     except (OSError, ValueError, RecursionError) as error:
         raise FolderError(

@@ -97,7 +97,7 @@ def test_a_folder_of_sessions_is_replayed_reported_scored_and_read_for_flows(
     [
         (["replay", "{many}", "--viewer", "web"], "are for one."),
         (["replay", "{many}", "--speed", "2"], "are for one."),
-        (["report", "{many}", "nowhere"], "nowhere is no session"),
+        (["report", "{many}", "nowhere"], "There is no folder nowhere"),
         (["score", "{none}"], "is no session, and holds none"),
         (["score", "{many}", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "--workers is of this machine"),
         (["flows", "{none}", "--from", "Q"], "--from 'Q' is not understood"),  # said before anything is read

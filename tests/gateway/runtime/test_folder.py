@@ -82,6 +82,11 @@ def test_a_folder_that_is_no_session_of_ours_is_refused_in_one_sentence(
     assert "\n" not in str(refused.value)
 
 
+def test_a_folder_that_does_not_exist_is_said_to_be_none(tmp_path: Path) -> None:
+    with pytest.raises(FolderError, match=r"^There is no folder .*nodir"):
+        read_record(tmp_path / "nodir")
+
+
 def test_a_folder_is_held_until_it_is_let_go(tmp_path: Path) -> None:
     write_record(tmp_path, RECORD)
     hold = Hold(tmp_path)
