@@ -12,6 +12,15 @@ from adapters.meters import SECOND, Envelope
 from gateway.observation import Timing
 
 
+def foreign_clock(name: str, lag_s: float) -> str:
+    """The sentence on a source whose clock is this far behind the session's (< 0: ahead of it), and what to do."""
+    side = "behind" if lag_s > 0 else "ahead of"
+    return (
+        f"The clock of {name} is {abs(lag_s):.0f} s {side} the session's: it is shown, not fused; "
+        f"set that clock, or begin a new session."
+    )
+
+
 @dataclass(slots=True)
 class SessionEpoch:
     """The session's time: the receiver's stamps, brought to the time that the sources live in.

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from adapters.clock import LIMIT_NS
-from adapters.epoch import SessionEpoch
+from adapters.epoch import SessionEpoch, foreign_clock
 from adapters.meters import SECOND, SpeedMeter
 from adapters.vehicle import Vehicle
 from adapters.vehicles import Component
@@ -151,9 +151,7 @@ class Moments:
         if key in self._foreign or len(self._foreign) >= _FOREIGN_AT_MOST:
             return
         self._foreign.add(key)
-        side = "behind" if lag_s > 0 else "ahead of"
-        text = f"The clock of {name} is {abs(lag_s):.0f} s {side} the session's: it is shown, not fused."
-        self.notes.append(("warning", text))
+        self.notes.append(("warning", foreign_clock(name, lag_s)))
 
 
 Reader = Callable[[Moments, Component, Vehicle, bytes, int, Counter[str]], Observations]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from adapters.clock import LIMIT_NS
-from adapters.epoch import SessionEpoch
+from adapters.epoch import SessionEpoch, foreign_clock
 from adapters.landing_radar import Header
 from adapters.meters import SpeedMeter
 from gateway.observation import Timing
@@ -38,10 +38,5 @@ class RadarClocks:
             return Timing.FOREIGN  # until the session's time is known nobody can say that it is late
         if timing is Timing.FOREIGN and not clock.is_named_foreign:
             clock.is_named_foreign = True
-            lag = self.epoch.lag_s(key)
-            side = "behind" if lag > 0 else "ahead of"
-            text = (
-                f"The clock of radar {header.radar} is {abs(lag):.0f} s {side} the session's: it is shown, not fused."
-            )
-            self.notes.append(("warning", text))
+            self.notes.append(("warning", foreign_clock(f"radar {header.radar}", self.epoch.lag_s(key))))
         return timing

@@ -125,5 +125,6 @@ def test_a_drone_of_another_time_is_foreign_and_named_once(plane: Any) -> None:
     plane.second += 1.0
     assert _say(plane, late_s=600.0)[0].timing is Timing.FOREIGN
     assert [note for note in plane.notes if "odid" in note] == [
-        "The clock of odid:0a1b2c3d4e5f is 600 s behind the session's: it is shown, not fused."
+        "The clock of odid:0a1b2c3d4e5f is 600 s behind the session's: it is shown, not fused; "
+        "set that clock, or begin a new session."
     ]

@@ -278,7 +278,8 @@ def test_a_second_source_of_another_time_is_foreign_and_named_once(plane: Talker
     assert _report(other.position()).timing is Timing.FOREIGN
     assert _report(plane.position()).timing is Timing.UTC
     assert [note for note in other.notes if "1000 s behind" in note] == [
-        "The clock of mavlink:2 is 1000 s behind the session's: it is shown, not fused."
+        "The clock of mavlink:2 is 1000 s behind the session's: it is shown, not fused; "
+        "set that clock, or begin a new session."
     ]
 
 
