@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from gateway.runtime.declaring import Declaring
     from gateway.runtime.links import Link
     from gateway.runtime.manners import Manners
+    from gateway.runtime.urls import Url
 
 _LINKS, _SENDING, _TRUST = "Links", "What is sent", "Who is believed"
 
@@ -97,11 +98,20 @@ class Links:
 
         with contextlib.ExitStack() as opened:
 
-            def links(texts: list[str] | None, port: int) -> list[Link]:
-                urls = take.read_urls(texts or [], port)
+            def links(urls: Sequence[Url]) -> list[Link]:
                 return [opened.enter_context(contextlib.closing(open_link(url))) for url in urls]
 
-            yield links(self.mavlink, MAVLINK_PORT), links(self.radar, RADAR_PORT)
+            mavlink = take.read_urls(self.mavlink or [], MAVLINK_PORT)
+            radar = take.read_urls(self.radar or [], RADAR_PORT)
+            _refuse_twice([*mavlink, *radar])
+            yield links(mavlink), links(radar)
+
+
+def _refuse_twice(urls: Sequence[Url]) -> None:
+    """Raises UsageError where two links would have to hold one port."""
+    for number, url in enumerate(urls):
+        if any(url.shares_port(other) for other in urls[:number]):
+            raise UsageError(f"{url}: this port is given twice; give each link of --mavlink and --radar its own.")
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ Scheme = Literal["udpin", "udpout", "tcp", "serial"]
 
 MAVLINK_PORT = 14550
 RADAR_PORT = 30070
+_EVERYWHERE = ("0.0.0.0", "::")  # hosts that stand for all of this machine's
 
 _EXAMPLES = "udpin:0.0.0.0:14550, udpout:127.0.0.1:14550, tcp:127.0.0.1:5760 or serial:/dev/ttyUSB0:57600"
 
@@ -33,6 +34,15 @@ class Url:
     port: int = 0
     device: str = ""
     baud: int = 0
+
+    def shares_port(self, other: Url) -> bool:
+        """Whether both would have to hold one port of this machine, which only one of them can."""
+        if self.scheme != other.scheme or self.scheme not in ("udpin", "serial"):
+            return False
+        if self.scheme == "serial":
+            return self.device == other.device
+        hosts = {self.host, other.host}
+        return self.port == other.port != 0 and (len(hosts) == 1 or not hosts.isdisjoint(_EVERYWHERE))
 
     def __str__(self) -> str:
         if self.scheme == "serial":

@@ -130,3 +130,18 @@ def test_the_viewer_is_a_window_only_where_there_is_a_screen(monkeypatch: pytest
 def test_live_without_a_link_is_refused_before_anything_is_opened() -> None:
     with pytest.raises(Failure, match="needs something to listen to"):
         live(Links())
+
+
+@pytest.mark.parametrize(
+    ("mavlink", "radar"),
+    [
+        (["udpin:127.0.0.1:14550", "udpin:0.0.0.0"], None),
+        (["udpin:127.0.0.1:30070"], ["udpin:127.0.0.1"]),
+        (["serial:/dev/ttyUSB0:57600", "serial:/dev/ttyUSB0:115200"], None),
+    ],
+)
+def test_one_port_given_twice_is_told_from_one_that_another_program_has(
+    mavlink: list[str], radar: list[str] | None
+) -> None:
+    with pytest.raises(Failure, match="this port is given twice"), Links(mavlink, radar).opened():
+        pass
