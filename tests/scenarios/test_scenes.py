@@ -30,7 +30,7 @@ begin_s = -30.0
 kind = "gps spoofed"
 vehicle = 1
 step_m = 500.0
-at_s = 30.0
+at_s = 32.0
 [[fault]]
 kind = "gps lost"
 vehicle = 2
@@ -54,14 +54,14 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_faults_are_seen_for_what_they_are(world: Path, tmp_path: Path, talkdown: Callable[..., Any]) -> None:
-    """A jump that leaves its own velocity, a fix that is lost, a clock two hours off: each is said once, and the tracks stay
+    """A jump that inertial data deny, a fix that is lost, a clock two hours off: each is said once, and the tracks stay
     with the aircraft, whose false positions are 500 m away."""
     assert talkdown("simulate", world / "faults.toml", "--archive", tmp_path, "--quiet").code == 0
     (session,) = tmp_path.iterdir()
     ran = talkdown("replay", session, "--viewer", "none", "--json")
     assert ran.code == 0
     for said in (
-        "mavlink:1: what it says of its position is not where its own velocities lead: it is not used",
+        "mavlink:1: what it says of its position jumped, which inertial data deny",
         "mavlink:2 has lost its GPS fix",
         "The clock of mavlink:2 is 7200 s ahead",
     ):
