@@ -166,10 +166,7 @@ def _sortie(flown: Flown, first: int, end: int, take_off_mps: float, beside: _Be
     pressure, height, height_by = _heights(flown, part)
     speed = paths.true_airspeed(flown.airspeed_mps[part], pressure, flown.temperature_k[part])
     pitch, roll = flown.pitch_rad[part], flown.roll_rad[part]
-    velocity = paths.air_velocity(speed, compass, pitch)
-    if height is not None:
-        attack = paths.attack_by_height(time_s, height, speed, pitch, roll)
-        velocity[:, :2] = paths.air_velocity(speed, compass, pitch, roll, attack)[:, :2]
+    velocity = _air_velocity(time_s, height, speed, compass, pitch, roll)
     through_air = (
         paths.integrated(time_s, velocity) if lift_off is None else paths.on_earth(time_s, velocity, lift_off[0])
     )
@@ -219,6 +216,17 @@ def _sortie(flown: Flown, first: int, end: int, take_off_mps: float, beside: _Be
         radar=radar,
         doubts=tuple(one for one in (rolled.doubt, end_is.doubt) if one is not None),
     )
+
+
+def _air_velocity(
+    time_s: Floats, height_m: Floats | None, speed_mps: Floats, compass_rad: Floats, pitch_rad: Floats, roll_rad: Floats
+) -> Floats:
+    """Through the air (n, 3), m/s; level, with the angle of attack taken off where heights tell it."""
+    velocity = paths.air_velocity(speed_mps, compass_rad, pitch_rad)
+    if height_m is not None:
+        attack = paths.attack_by_height(time_s, height_m, speed_mps, pitch_rad, roll_rad)
+        velocity[:, :2] = paths.air_velocity(speed_mps, compass_rad, pitch_rad, roll_rad, attack)[:, :2]
+    return velocity
 
 
 def _heights(flown: Flown, part: slice) -> tuple[Floats, Floats | None, str]:
