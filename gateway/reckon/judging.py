@@ -65,7 +65,10 @@ def judged(tip: Tip, place: Floats, late_s: Floats, held: Bools, unseen: Floats,
     worst = _square(off[..., :2], faster[..., :2], tip)
     tip, walked, square = followed(tip, place, late_s)
     refuses = np.array(settings.refuses)
-    trusted = (tip.cell - tip.began >= TRUSTED_AFTER) & refuses
+    learnt = tip.cell - tip.began >= TRUSTED_AFTER
+    # Until then what is far off is no jump: dead reckoning was never right beside this source, and learns from here on.
+    tip = replace(tip, began=np.where(~learnt & (worst[:, 0] > FAR), tip.cell, tip.began))
+    trusted = learnt & refuses
     jumps = trusted & (worst[:, 0] > FAR)
     old = tip.cell[:, None] - tip.seeded[:, 1:] >= OLD_ENOUGH
     bound = np.where(held, WALKED, UNHELD * WALKED * np.maximum(tip.times, 1.0))
