@@ -14,6 +14,7 @@ from pathlib import Path
 
 from adapters.files import FileError
 from adapters.reasons import reason_of
+from gateway.runtime.archived import read_table
 from gateway.runtime.folder import INPUTS, SESSION_FILE, FolderError, Record, read_record
 from gateway.runtime.outputs import RRD_FILE
 from gateway.runtime.sessions import mend, session_folders
@@ -34,7 +35,8 @@ class Fault:
 class Listed:
     """One session as a list shows it. `record` is None where session.json cannot be read; `written_at`: ns since 1970 UTC.
 
-    `mended` says what was done to it just now, "" for nothing.
+    `mended` says what was done to it just now, "" for nothing; `tracked` who has a track in the tables of one that was never
+    summed up.
     """
 
     folder: Path
@@ -43,6 +45,7 @@ class Listed:
     size_bytes: int
     faults: tuple[Fault, ...] = ()
     mended: str = ""
+    tracked: tuple[str, ...] = ()
 
     @property
     def running(self) -> bool:
@@ -76,13 +79,13 @@ class Listed:
 
     @property
     def vehicles(self) -> tuple[str, ...]:
-        """Who had a track; of a session that was not summed up, which peers sent MAVLink."""
+        """Who had a track; where nothing tells (it runs, or was killed before its place was known), which peers sent MAVLink."""
         if self.record is None:
             return ()
         told = self.record.summary.get("aircraft")
         if isinstance(told, list) and all(isinstance(one, str) for one in told):
             return tuple(told)
-        return tuple(source.name for source in self.record.sources if source.kind == "mavlink")
+        return self.tracked or tuple(source.name for source in self.record.sources if source.kind == "mavlink")
 
 
 def _site_name(text: str) -> str:
@@ -122,9 +125,21 @@ def look(folder: Path) -> Listed:
         record = read_record(folder)
     except FolderError as error:
         return Listed(folder, None, written_at, sum(sizes.values()), (Fault(str(error), SESSION_FILE),))
+    tracked: tuple[str, ...] = ()
     if record.ended is not None:
         faults += _faults(folder, record, sizes)
-    return Listed(folder, record, written_at, sum(sizes.values()), tuple(faults), mended)
+        if "aircraft" not in record.summary:
+            tracked = _tracked(folder)
+    return Listed(folder, record, written_at, sum(sizes.values()), tuple(faults), mended, tracked)
+
+
+def _tracked(folder: Path) -> tuple[str, ...]:
+    """Who has a track in a session's table; nobody where there is none, or it is spoiled: that is a fault already."""
+    try:
+        names = read_table(folder, "tracks", ["aircraft"])["aircraft"].unique().to_pylist()
+    except FolderError:
+        return ()
+    return tuple(sorted(name for name in names if name is not None))
 
 
 def _sizes(folder: Path) -> dict[str, int]:

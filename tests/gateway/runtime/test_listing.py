@@ -60,6 +60,15 @@ def test_a_list_says_where_who_how_long_how_large_and_how_it_ended(session: Path
     assert one.size_bytes == sum(path.stat().st_size for path in session.rglob("*") if path.is_file())
 
 
+def test_of_a_session_that_was_never_summed_up_the_tracks_tell_who_flew(session: Path) -> None:
+    """Not the link that they were heard over."""
+    write_record(session, replace(read_record(session), ended="killed", summary={}))
+    assert look(session).vehicles == ("mavlink:1",)
+    (session / "tracks.parquet").unlink()
+    sources = tuple(source.name for source in read_record(session).sources if source.kind == "mavlink")
+    assert look(session).vehicles == sources != ("mavlink:1",)
+
+
 def test_what_is_no_session_is_passed_over_and_what_cannot_be_read_is_named(tmp_path: Path) -> None:
     _written(tmp_path / "good", PLAIN)
     (tmp_path / "photos").mkdir()
