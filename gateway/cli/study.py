@@ -19,7 +19,8 @@ from sim.studies import STUDIES, Study
 _LONGEST = 1000  # characters of a table's line
 
 _HELP = """
-Run a paper's experiment and show its table; its figures go into an .rrd for the viewer.
+Run a paper's experiment and show its table; the figures of most go into an .rrd for the viewer (conflicts, live-registration,
+noise, sigmas and tuning only show tables). With their usual --runs many take minutes; fewer runs are quicker.
 
 Example:
 

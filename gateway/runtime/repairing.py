@@ -53,7 +53,7 @@ def repair(session: Listed) -> Listed:
         done.append(f"{', '.join(broken)} made again from the inputs")
     left = look(session.folder)
     told = ", ".join([*filter(None, (session.mended, left.mended)), *done])
-    return Listed(left.folder, left.record, left.written_at, left.size_bytes, left.faults, told)
+    return replace(left, mended=told)
 
 
 def _replay(folder: Path, names: list[str]) -> None:
