@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sim.studies import STUDIES, prediction
+from sim.studies import STUDIES, prediction, prediction_honesty
 from sim.studies import alpha_beta_gamma_peers as peers
 from sim.studies import alpha_beta_gamma_tables as tables
 from sim.studies.alpha_beta_gamma import run
@@ -35,8 +35,9 @@ def test_the_alpha_beta_gamma_study_fills_its_tables_and_draws(tmp_path: Path, m
     assert (tmp_path / "figures.rrd").read_bytes()[:4] == b"RRF2"
 
 
-def test_the_prediction_study_fills_its_tables_and_draws(tmp_path: Path) -> None:
+def test_the_prediction_study_fills_its_tables_and_draws(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two runs give every table rows as wide as its headings, literal and default among them, and a recording."""
+    monkeypatch.setattr(prediction_honesty, "SECONDS", 240)
     found = prediction.run(2, 1, rrd=tmp_path / "figures.rrd")
     assert len(found.tables) == 6
     for table in found.tables:
