@@ -1,4 +1,7 @@
-"""Align, within a step: what was heard, brought into the site's frames; what cannot be used is counted and said."""
+"""Align, within a step: what was heard, brought into the site's frames, and these to where a runway that moves is.
+
+What cannot be used is counted and said.
+"""
 
 from __future__ import annotations
 

@@ -53,9 +53,8 @@ class Reckoning:
     force_bias_mps2: Floats
     wind_mps: Floats
     covariance: Floats
-    drag_per_s: Floats = field(
-        default_factory=lambda: np.zeros(())
-    )  # (...,) the share of its airspeed lost in a second
+    # (...,) the share of its airspeed lost in a second
+    drag_per_s: Floats = field(default_factory=lambda: np.zeros(()))
 
     @property
     def one(self) -> Floats:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from gateway.estimators.inertial import EARTH_RATE_RADPS, from_angles, matrix
-from gateway.estimators.tied_path import Knots, WindEvidence
+from gateway.estimators.tied_path import Knots, WindEvidence, at_times
 from gateway.geodesy import STANDARD_GRAVITY_MPS2
 
 Floats = NDArray[np.float64]
@@ -123,9 +123,8 @@ def wind_evidence(
     sigma_mps = np.hypot(AIR_SIGMA_MPS, AIR_SIGMA_SHARE * np.linalg.norm(air_velocity_mps, axis=1).mean())
     shares = knots.hats(time_s)
     means = shares / shares.sum(axis=0)  # what is compared at a knot: the mean about it
-    gained = np.stack([np.interp(time_s, part.time_s, axis) for axis in velocity.T], axis=-1)
-    shown = np.stack([np.interp(time_s, part.time_s, one) for one in by_bias.reshape(len(by_bias), 6).T], axis=-1)
-    shown = shown.reshape(-1, 2, 3)
+    gained = at_times(time_s, part.time_s, velocity)
+    shown = at_times(time_s, part.time_s, by_bias.reshape(len(by_bias), 6)).reshape(-1, 2, 3)
     for axis in (0, 1):
         wind = np.zeros((count, unknowns.size))
         wind[:, unknowns.wind(axis)] = means.T @ shares

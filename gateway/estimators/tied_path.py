@@ -135,7 +135,7 @@ def tied(
     vector = np.zeros(len(information))
     if evidence is not None:
         information, vector = information + evidence.information, vector + evidence.vector
-    through_air = np.stack([np.interp(known.time_s, time_s, axis) for axis in path_m.T], axis=-1)
+    through_air = at_times(known.time_s, time_s, path_m)
     left = known.value - (known.rates * through_air).sum(axis=1)
     carried = knots.carried(known.time_s)
     rows = np.concatenate([known.rates[:, :1] * carried, known.rates[:, 1:] * carried], axis=1) / known.sigma[:, None]
@@ -153,6 +153,11 @@ def tied(
         found,
         covariance,
     )
+
+
+def at_times(time_s: Floats, known_s: Floats, values: Floats) -> Floats:
+    """Columns (n, k) that are known at times (n,), at other times (m,): (m, k), linear between."""
+    return np.stack([np.interp(time_s, known_s, column) for column in values.T], axis=-1)
 
 
 def _prior(knots: Knots, wind_sigma_mps: float, wanders: float) -> Floats:

@@ -72,7 +72,7 @@ class Displacements:
     def remembered(self, at: int, since: int, most: int) -> Displacements:
         """The same without aircraft that were not heard since, or the least lately heard of too many.
 
-        Who has ended no leg yet has nothing to be remembered by once his leg is broken off.
+        Whose legs have told nothing, or none has ended yet, has nothing to be remembered by once his leg is broken off.
         """
         keep = self.heard >= np.where(self.sums[:, :, LEGS].any(axis=1), since, at - int(GAP_S * SECOND))
         if len(keep) > most:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.align import SECOND
 from gateway.estimators import flight_path as paths
 from gateway.estimators.inertial_wind import Felt, stands, wind_evidence
 from gateway.estimators.tied_path import Knots, Known, Tied, WindEvidence, tied
@@ -20,7 +21,6 @@ Floats = NDArray[np.float64]
 Place = tuple[float, float]  # latitude, longitude, rad
 Muted = tuple[tuple[int, int], ...]  # times, ns, of which nothing is used
 
-SECOND = 1_000_000_000
 END_SIGMA_M = 1.0  # of a place on which a path is closed
 USUAL_SIGMA_M = 3.0  # of a position whose stream does not say
 GAP_S = 10.0  # a longer silence is not integrated over

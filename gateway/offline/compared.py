@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.estimators.tied_path import at_times
 from gateway.offline.carrying import Place, level_m
 from gateway.offline.parameters import Times
 
@@ -52,10 +53,7 @@ def compared_with(
     at_s = (told_at[within] - time[0]) * 1e-9
     time_s = (time - time[0]) * 1e-9
     told = level_m(values[within, 0], values[within, 1], lift_off)
-    rebuilt, alone = (
-        np.stack([np.interp(at_s, time_s, axis) for axis in one.T], -1) for one in (path_m, open_m[:, :2])
-    )
-    off, off_alone = (np.linalg.norm(one - told, axis=1) for one in (rebuilt, alone))
+    off, off_alone = (np.linalg.norm(at_times(at_s, time_s, one) - told, axis=1) for one in (path_m, open_m[:, :2]))
     high = np.where(np.isnan(values[within, 2]), values[within, 3], values[within, 2])
     high = high - high[0]
     lower = np.interp(at_s, time_s, height_m) - high

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.align import SECOND
 from gateway.estimators import flight_path as paths
-from gateway.offline.carrying import SECOND, Place, level_m
+from gateway.offline.carrying import Place, level_m
 from gateway.offline.parameters import Flown
 from gateway.settings import Runway
 
@@ -23,13 +24,12 @@ _STRONGEST_MPS = 100.0  # no wind that small aircraft fly in is stronger, and fe
 _ELSEWHERE_M, _ELSEWHERE_SHARE = (
     300.0,
     0.02,
-)  # beyond both it landed elsewhere; 2 % of the way is what rebuilding is worth
+)  # beyond both it landed elsewhere; 2 % of its way is what rebuilding is worth
 # Of the airspeed. Closing a flight that ends elsewhere takes its way there for wind: straight ahead all of the airspeed, over
 # half of it where it ends further away than half of what it flew. Little flies in such a wind.
 _ABSURD_SHARE = 0.5
-_OFF_RUNWAY_M = (
-    1000.0  # beyond its ends, or beside it: a position is not better than that, nor where airspeed says lift-off
-)
+# Beyond its ends, or beside it: a position is not better than that, nor where airspeed says lift-off.
+_OFF_RUNWAY_M = 1000.0
 _OFF_DIRECTION_RAD = math.radians(20.0)  # no compass is wrong by more that a path can be made of
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.estimators.tied_path import WANDERS_MPS_PER_SQRT_S, Known, Tied
+from gateway.estimators.tied_path import WANDERS_MPS_PER_SQRT_S, Known, Tied, at_times
 from gateway.fuse.weighting import polar_difference
 from gateway.offline.carrying import Place
 from gateway.offline.sightings import View, names_of
@@ -124,7 +124,7 @@ class _Search:
 
     def __init__(self, way: Way, rows: _Rows, tie: Tie) -> None:
         self._way, self._rows, self._tie = way, rows, tie
-        self._air = _at(rows.time_s, way.time_s, way.through_air_m)
+        self._air = at_times(rows.time_s, way.time_s, way.through_air_m)
         self._above = np.interp(rows.time_s, way.time_s, way.height_m)
         ground = rows.views[0].runway.runway.height_m
         self._height = self._above + ground
@@ -200,7 +200,7 @@ class _Search:
         return _Fit(mask, known, self._misfit(taken, tied))
 
     def _place(self, tied: Tied) -> Floats:
-        return _at(self._rows.time_s, self._way.time_s, tied.path_m)
+        return at_times(self._rows.time_s, self._way.time_s, tied.path_m)
 
     def _close(self, place_m: Floats, tied: Tied) -> Ints:
         """The rows worth a closer look: where the path is known well enough, and not surely elsewhere."""
@@ -279,8 +279,3 @@ class _Search:
             return math.inf
         changes = np.diff(wind, axis=1) / (WANDERS_MPS_PER_SQRT_S * math.sqrt(tied.knots.step_s))
         return max(float(np.mean(left**2)), float(np.mean(changes**2)))
-
-
-def _at(time_s: Floats, known_s: Floats, place_m: Floats) -> Floats:
-    """Places (m, 2) at other times."""
-    return np.stack([np.interp(time_s, known_s, axis) for axis in place_m.T], axis=-1)

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.align import SECOND
 from gateway.estimators import flight_path as paths
 from gateway.estimators.inertial_wind import Felt
 from gateway.estimators.tied_path import Tied
 from gateway.offline.carrying import (
     GAP_S,
-    SECOND,
     Muted,
     Place,
     carried,

@@ -18,6 +18,7 @@ from gateway.offline.parameters import Series, Times
 from gateway.register import Remembered
 from gateway.register.corrections import stated
 from gateway.settings import RadarSite, Site
+from gateway.track import name_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -126,9 +127,8 @@ def _too_much(radar: RadarSite, remembered: Remembered | None) -> Correction:
 
 def names_of(views: Sequence[View], row_view: Ints, row_number: Ints) -> list[str]:
     """What each plot's track is called, "1/3"."""
-    return [
-        f"{views[view].radar}/{number}" for view, number in zip(row_view.tolist(), row_number.tolist(), strict=True)
-    ]
+    rows = zip(row_view.tolist(), row_number.tolist(), strict=True)
+    return [name_of((views[view].radar, number, 0)) for view, number in rows]
 
 
 def seen_within(views: Sequence[View], first: int, last: int, muted: Collection[tuple[int, Muted]]) -> list[View]:

@@ -28,9 +28,7 @@ Bools = NDArray[np.bool_]
 
 PRIOR = 1.0  # horizons' worth of predictions that were as far off as is thought to begin with
 MEMORY = 20.0  # horizons after which what was learnt has faded to a third
-AT_MOST = (
-    3.0  # of the sigmas now: one prediction that is off by more counts no more, or few would make all others' too large
-)
+AT_MOST = 3.0  # of the sigmas now: who is off by more counts no more, or few would make all others' sigmas too large
 USUAL = 0.7971  # the mean size of a Gaussian's values of sigma 1 that count at most so much
 LEAST, MOST = 1.0 / 3.0, 10.0  # scales
 LEAST_SIGMA_M = 0.01

@@ -193,10 +193,8 @@ def cases_at(ways: Ways, rows: Ints, at: Ints) -> tuple[tuple[Case, ...], Floats
     upright, squares, speed = ways.upright[rows, near] ** 2, (along * along, across * across), ways.straight_mps[rows]
     if np.isnan(speed).all():
         return (Case(np.ones(len(rows)), _turned(squares[0], squares[1], course)),), upright
-    goes_on, here = (
-        np.where(np.isnan(speed), 0.0, np.exp(-np.maximum(since_s, 0.0) / STRAIGHT_S)),
-        ways.along[rows, 0] ** 2,
-    )
+    goes_on = np.where(np.isnan(speed), 0.0, np.exp(-np.maximum(since_s, 0.0) / STRAIGHT_S))
+    here = ways.along[rows, 0] ** 2
     late, aside = SLOWS * speed * speed * since_s**3, (KEEPS_RAD * speed * since_s) ** 2
     straight = [np.fmin(here + wanders, square) for wanders, square in zip((late, aside), squares, strict=True)]
     others = [(square - goes_on * small) / (1.0 - goes_on) for square, small in zip(squares, straight, strict=True)]

@@ -30,6 +30,11 @@ class By(IntEnum):
     TILT = 4  # how its rotors lean, in the wind and with the drag that were found
 
     @property
+    def denies(self) -> bool:
+        """Whether it can say that a position is false; what the others hold nothing holds."""
+        return self in (By.UNIT, By.AIRSPEED)
+
+    @property
     def words(self) -> str:
         """What it is called where people are told of it."""
         held = "its heading and the speed that it had"

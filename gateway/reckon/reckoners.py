@@ -123,7 +123,7 @@ class Reckoners:
     def denies(self, aircraft: str, at: int) -> bool:
         """Whether dead reckoning judges a vehicle's positions by itself."""
         found = self.of(aircraft, at)
-        return found is not None and (found.trusted or self.by(aircraft) in (By.UNIT, By.AIRSPEED))
+        return found is not None and (found.trusted or self.by(aircraft).denies)
 
     def by(self, aircraft: str) -> By:
         """What carries a vehicle on."""

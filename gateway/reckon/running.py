@@ -67,28 +67,28 @@ def begun(at: int, place: Floats, attitude: Floats, settings: DeadReckoning, by:
     motion = Motion(latitude, longitude, above, velocity, attitude[None])
     drag = DRAG_PER_S if by == By.TILT else None
     state = dr.started(motion, sigma, speed, lean, unit_of(settings, by), drag)
-    one = np.array([cell])
+    here, none, unknown, nothing = np.array([cell]), np.zeros(1, np.int64), np.array([math.nan]), np.zeros(1)
     return Tip(
         spread(state),
-        one,
-        one,
-        np.full((1, HYPOTHESES), cell),
-        one,
-        np.array([place[6] ** 2]),
-        np.array([place[8] ** 2]),
-        np.array([math.nan]),
-        np.zeros(1, np.int64),
-        np.zeros(1, np.int64),
-        np.zeros((1, 3)),
-        np.zeros(1, np.int64),
-        np.zeros(1),
-        np.zeros(1),
-        np.array([math.nan]),
-        np.full((1, 5), math.nan),
-        one,
-        np.zeros((1, HYPOTHESES, 2)),
-        np.zeros(1, np.int64),
-        np.zeros(1),
+        cell=here,
+        began=here,
+        seeded=np.full((1, HYPOTHESES), cell),
+        heard=here,
+        scatter_m2=np.array([place[6] ** 2]),
+        scatter_mps2=np.array([place[8] ** 2]),
+        above_m=unknown,
+        denied=none,
+        agreed=none,
+        accelerated_mps2=np.zeros((1, 3)),
+        proved=none,
+        times=nothing,
+        rough=nothing,
+        told_from_mps=unknown,
+        last=np.full((1, 5), math.nan),
+        placed=here,
+        walked_m=np.zeros((1, HYPOTHESES, 2)),
+        followed=none,
+        strays=nothing,
     )
 
 
@@ -166,7 +166,7 @@ def _through(tip: Tip, told: Block, kinds: Kinds, by: By, cell: int, unit: Unit,
     unseen = stands[~kinds.unit[stands]]
     if len(unseen):  # no unit tells how it takes off, or is thrown: it denies nothing until it has flown for a while
         tip = tip.put(unseen, replace(some := tip.taken(unseen), began=some.cell))
-    if by not in (By.UNIT, By.AIRSPEED):  # what they hold nothing holds: they deny no position
+    if not by.denies:
         tip = replace(tip, began=tip.cell)
     if end % SEEDED_EVERY == 0:
         which = 1 + end // SEEDED_EVERY % (HYPOTHESES - 1)

@@ -21,14 +21,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 INERTIAL, ATTITUDE, AIRSPEED, ALTITUDE, HEADING, RESTING = range(6)
-WIDTHS = (
-    7,
-    4,
-    1,
-    1,
-    1,
-    1,
-)  # force, rate, sensor; quaternion; indicated airspeed; altitude above mean sea level; heading; rest
+# Force, rate, sensor; quaternion; indicated airspeed; altitude above mean sea level; heading; rest.
+WIDTHS = (7, 4, 1, 1, 1, 1)
 MOVES, ON_GROUND, DISARMED = 0.0, 1.0, 2.0  # what a vehicle says of its rest
 PLACE = 9  # latitude, longitude, height; velocity north, east, down; sigmas level, upright, of the velocity
 

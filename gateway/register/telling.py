@@ -38,7 +38,7 @@ def table(
     return replace(_known(registration, some), correction=correction, residuals=Residuals.of(learnt))
 
 
-@lru_cache(maxsize=4)  # it changes each second, and is told at each step
+@lru_cache(maxsize=1)  # it changes each second, and is told at each step
 def _known(registration: Registration, radars: tuple[RadarSite, ...]) -> Registered:
     """What is known of some radars, without what is taken off."""
     told = Registered.untold([radar.number for radar in radars], np.zeros((len(radars), EACH)))

@@ -1,6 +1,6 @@
 """Whether sigmas of predictions are honest: vehicles that fly drawn missions in closed loop, heard by a gateway, and scored.
 
-Amounts of `gateway/predict/spread.py` were fitted on seeds 101 to 103, 111 and 112; every other seed is a test.
+Amounts of `gateway/predict/spread.py` were chosen on seeds 101 to 103, 111 and 112, and on recordings; other seeds are tests.
 """
 
 from __future__ import annotations
