@@ -18,7 +18,7 @@ from gateway.reckon.cells import BLOCK, CELL_NS, CELL_S, SECOND_CELLS, Block, Ce
 from gateway.reckon.judging import judged
 from gateway.reckon.kinds import HELD, By, Kinds
 from gateway.reckon.standing import with_standing
-from gateway.reckon.ties import SLOWEST_AIR_MPS, of_some, tied, with_altitude, with_picture
+from gateway.reckon.ties import LASTS_S, SLOWEST_AIR_MPS, of_some, tied, with_altitude, with_picture
 from gateway.reckon.tip import HYPOTHESES, SEEDED_EVERY, Tip, hypothesis, joined, split_anew, spread, with_hypothesis
 from gateway.settings import DeadReckoning
 
@@ -207,5 +207,6 @@ def _with_bias(state: Reckoning, told: Block, kinds: Kinds, settings: DeadReckon
         return state
     bias = np.mean(told.rate[rows] - told.turned[rows], axis=1)
     power = settings.attitude_wanders**2 + (UNSEEN_SHARE * told.unseen[rows, 3:]) ** 2
-    sigma = np.sqrt(power / (BLOCK * CELL_S))
+    # What autopilots turn wrongly lasts as their attitudes' errors do, and these attitudes tie the filter too: each half.
+    sigma = np.sqrt(power / (BLOCK * CELL_S)) * math.sqrt(2.0 * 2.0 * LASTS_S / (BLOCK * CELL_S))
     return of_some(state, rows, lambda some: dr.with_gyro_bias(some, bias[:, None], sigma[:, None])[0])

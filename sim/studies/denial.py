@@ -165,7 +165,9 @@ def table(vehicles: int, seed: int, figures: dict[str, float], progress: Progres
         progress(f"false positions: {name}", 0.9)
         after_s = ran(vehicles, seed, length_s, falsified, kinds).denied_after_s()
         figures |= {f"denied, {name}, median": float(np.median(after_s)), f"denied, {name}, last": max(after_s)}
-        rows.append((name, vehicles, float(np.median(after_s)), max(after_s), sum(map(math.isinf, after_s))))
+        never = sum(map(math.isinf, after_s))
+        figures[f"denied, {name}, %"] = 100.0 * (1.0 - never / vehicles)
+        rows.append((name, vehicles, float(np.median(after_s)), max(after_s), never))
     for name, kinds in (("good", KINDS), ("copters and boats: good", UNHELD)):
         progress(f"positions: {name}", 0.92)
         clean = ran(2 * vehicles, seed + 1, CLEAN_S, honest, kinds)
