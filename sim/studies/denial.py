@@ -96,6 +96,11 @@ def ran(vehicles: int, seed: int, length_s: float, falsified: Falsified, kinds: 
         vehicle_type, kind = kinds[number % len(kinds)]
         ride, errors = kind(generator, length_s), SHAKEN.get(kind, Errors())
         tellers.append(Teller.of(f"mavlink:{number + 1}", vehicle_type, ride, generator, falsified, errors))
+    return reckoned(tellers)
+
+
+def reckoned(tellers: Sequence[Teller]) -> Ran:
+    """Their dead reckoning from the first second on."""
     told = [told_of(one) for one in tellers]
     settings = DeadReckoning()
     first = [begun(int(one.places.at[9]), one.places.values[9], one.series[1].values[9], settings) for one in told]
