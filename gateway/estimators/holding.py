@@ -50,18 +50,18 @@ def turn_along(noise: Floats, course: Floats, share: Floats, most: Floats, uneve
     There shares (u,) of its sigma are left along the course, and shares (n, u), no less, across it. A course of 0, of what
     stands, leaves it alike.
     """
-    turned = _turned(course, share, np.maximum(most, share))
-    for mode, way in zip(uneven.tolist(), turned.transpose(1, 0, 2, 3), strict=True):
+    ways = turned(course, share, np.maximum(most, share))
+    for mode, way in zip(uneven.tolist(), ways.transpose(1, 0, 2, 3), strict=True):
         of_mode = noise[:, mode]
         of_mode[:, _MOVING[:, None], _MOVING] = _along_both(of_mode[:, 0:4:3, 0:4:3], way)
 
 
 def add_held(carry: Floats, noise: Floats, elapsed_s: Floats, course: Floats, held: Held, holds: Sequence[int]) -> None:
     """Fill in what two states more do to transition and noise (n, m, 11, 11) over times (n,), of which the modes `holds` do."""
-    turned = usual(course, held)
-    response, grown = _answers(elapsed_s, held.lasts_s)
-    noise[..., SIZE:, SIZE:] = turned[:, None]
-    block = _along_both(grown, turned).reshape(-1, len(_BLOCK))
+    drawn = usual(course, held)
+    response, grown = answers(elapsed_s, held.lasts_s)
+    noise[..., SIZE:, SIZE:] = drawn[:, None]
+    block = _along_both(grown, drawn).reshape(-1, len(_BLOCK))
     for mode in holds:
         carry[:, mode, _LEVEL, _HELD] = response[:, _ORDER]
         noise[:, mode, SIZE:, SIZE:] = 0.0
@@ -69,25 +69,25 @@ def add_held(carry: Floats, noise: Floats, elapsed_s: Floats, course: Floats, he
         flat[:, _BLOCK] += block
 
 
-def _along_both(parts: Floats, turned: Floats) -> Floats:
+def _along_both(parts: Floats, way: Floats) -> Floats:
     """Covariances (n, 2 k, 2 k) of k quantities, east and north each: parts (n, k, k) alike on both axes, times (n, 2, 2)."""
     n, k, _ = parts.shape
-    return (parts[:, :, None, :, None] * turned[:, None, :, None, :]).reshape(n, 2 * k, 2 * k)
+    return (parts[:, :, None, :, None] * way[:, None, :, None, :]).reshape(n, 2 * k, 2 * k)
 
 
 def usual(course: Floats, held: Held) -> Floats:
     """Covariance (n, 2, 2) of an acceleration of which nothing is known, at courses (n, 2)."""
-    return held.across_mps2**2 * _turned(course, np.array([held.along_mps2 / held.across_mps2]))[:, 0]
+    return held.across_mps2**2 * turned(course, np.array([held.along_mps2 / held.across_mps2]))[:, 0]
 
 
-def _turned(course: Floats, along: Floats, across: Floats | float = 1.0) -> Floats:
+def turned(course: Floats, along: Floats, across: Floats | float = 1.0) -> Floats:
     """Variances (n, m, 2, 2) of which sigma is a share (m,) along the course and a share (n, m) across it."""
     way = course[:, None, :, None] * course[:, None, None, :]
     square = np.asarray(across * across)[..., None, None]
     return np.asarray(square * _UNIT + ((along * along)[:, None, None] - square) * way)
 
 
-def _answers(elapsed_s: Floats, lasts_s: float) -> tuple[Floats, Floats]:
+def answers(elapsed_s: Floats, lasts_s: float) -> tuple[Floats, Floats]:
     """What becomes of an acceleration over times (n,).
 
     (n, 3): what one of 1 adds to position and velocity, and what is left of it; and the covariance (n, 3, 3) that the noise

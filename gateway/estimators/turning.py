@@ -43,8 +43,16 @@ def carried(shaken: Shaken, elapsed_s: Floats, turn_rate: Floats, size: int = SI
     beyond the nine are left at 0.
     Source: 000 2.1.1 eq 3, 4, lost in the print: the coordinated turn of the literature, straight at a rate of 0.
     Deviation: the noise is of the time since the last update, not of a fixed period.
-    Each different entry is a power of the time, times a function of the angle, times what the motion is shaken by; then they
-    are taken to their places.
+    The different `entries` are taken to their places.
+    """
+    different = entries(shaken, elapsed_s, turn_rate)
+    return different.take(_CARRY[:size, :size], axis=-1), different.take(_NOISE[:size, :size], axis=-1)
+
+
+def entries(shaken: Shaken, elapsed_s: Floats, turn_rate: Floats) -> Floats:
+    """The different entries (n, m, 19) of transition and noise of `carried`, in the order of `_ENTRIES`.
+
+    Each is a power of the time, times a function of the angle, times what the motion is shaken by.
     """
     t = elapsed_s[:, None]
     angle = t * turn_rate
@@ -64,10 +72,10 @@ def carried(shaken: Shaken, elapsed_s: Floats, turn_rate: Floats, size: int = SI
     shapes[..., _LOST] = 1.0 - keep * keep
     square = t * t
     powers = np.concatenate([np.ones_like(t), t, square, square * t], axis=1)
-    entries = shapes.take(_SHAPE, axis=-1)
-    entries *= powers.take(_POWER, axis=1)[:, None]
-    entries *= shaken.scale
-    return entries.take(_CARRY[:size, :size], axis=-1), entries.take(_NOISE[:size, :size], axis=-1)
+    different = shapes.take(_SHAPE, axis=-1)
+    different *= powers.take(_POWER, axis=1)[:, None]
+    different *= shaken.scale
+    return different
 
 
 def _bend(angle: Floats, half_sine: Floats) -> Floats:
