@@ -35,6 +35,10 @@ class Shaken:
         by = {"": np.ones_like(level), "level": level, "upright": upright, "error": error_m2}
         return cls(level, fades, np.stack([share * by[what] for _, _, share, what in _ENTRIES], axis=1))
 
+    def only(self, some: Ints | NDArray[np.bool_]) -> Shaken:
+        """What shakes some of them."""
+        return Shaken(self.level[some], self.fades[some], self.scale[some])
+
 
 def carried(shaken: Shaken, elapsed_s: Floats, turn_rate: Floats, size: int = SIZE) -> tuple[Floats, Floats]:
     """Transition and noise (n, m, size, size) over times (n,) of m motions that turn at rates (n, m), rad/s, 0 = straight.

@@ -1,0 +1,168 @@
+"""Batches of tracks whose filter may be compiled: the same numbers as the gateway's own, whatever is measured.
+
+Without numba the loops are run as they stand, number by number; with it, as machine code.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gateway.estimators.batch import layout, packed, tracks
+from gateway.estimators.batch.lanes import Lanes
+from gateway.estimators.batch.layout import Layout
+from gateway.estimators.batch.stacked import Stacked
+from gateway.estimators.kalman import Estimate, Motion, start
+from gateway.estimators.modes import Mode, Modes
+from gateway.fuse.flying import modes_of
+from gateway.settings import Estimation, Options
+from sim.studies import rmimm
+
+Floats = NDArray[np.float64]
+
+AGREE = 1e-9  # of each state's own sigma, and of weights
+N = 3
+WHOLE = np.concatenate([np.eye(6, 9)[None], np.zeros((1, 0, 9))], axis=1)
+WHOLE[0, :3, 6:] = np.eye(3)  # position with the source's error, and velocity
+
+
+@pytest.fixture(autouse=True)
+def narrow(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Two blocks of two tracks, the last one filled up."""
+    monkeypatch.setattr(layout, "STEP", 1)
+    monkeypatch.setattr(layout, "WIDEST", 2)
+    assert Layout.of(N) == Layout(N, 2, 2)
+    yield
+
+
+def gateways(estimator: str = "rmimm") -> Modes:
+    """The gateway's five modes of eleven states."""
+    modes = modes_of(Options(estimator=estimator), Motion((1.0,) * 3, 20.0), Estimation())
+    assert modes is not None
+    return modes
+
+
+@dataclass
+class Both:
+    """The same tracks in both ways, and what was told of them last."""
+
+    stacked: tracks.Tracks
+    lanes: tracks.Tracks
+
+    @classmethod
+    def begin(cls, modes: Modes, sigma_m: float = 20.0) -> Both:
+        """Three aircraft of 15 to 130 m/s, and one that stands."""
+        random = np.random.default_rng(5)
+        velocity = np.array([[15.0, 3.0, 0.5], [-90.0, 93.0, -3.0], [0.0, 0.0, 0.0]])
+        spread = np.tile(sigma_m**2 * np.eye(3), (N, 1, 1))
+        first = start(random.normal(0.0, 3e4, (N, 3)), spread, velocity, np.full(N, 4.0), 20.0)
+        return cls(Stacked.begin(first, modes), Lanes.begin(first, modes))
+
+    def step(
+        self,
+        elapsed_s: Floats,
+        off: Floats,
+        h: Floats,
+        variance: float,
+        transition: Floats | None = None,
+        robust: float | None = None,
+    ) -> None:
+        """A time on, and a measurement that lies `off` (n, k) from where the first track's modes have it."""
+        m = self.lanes.weights.shape[1]
+        after = []
+        for way in (self.stacked, self.lanes):
+            ahead = way.predict(elapsed_s, transition)
+            means = self.stacked.predict(elapsed_s, transition).means if way is self.stacked else ahead.means
+            seen = (h @ means[:, :9, None])[:, :, 0].reshape(N, m, -1)
+            innovation = (seen[:, :1] + off[:, None] - seen).reshape(N * m, -1)
+            after.append(ahead.update(innovation, h, np.full(innovation.shape, variance), robust))
+        (self.stacked, *told), (self.lanes, *again) = after
+        for one, other in zip(told, again, strict=True):
+            assert other == pytest.approx(one, rel=1e-8, abs=1e-8)
+        self.agree()
+
+    def agree(self) -> None:
+        """Weights, the modes' means, what is combined and what is stated."""
+        sigma = np.sqrt(np.diagonal(self.stacked.combine().covariance, axis1=1, axis2=2))
+        assert self.lanes.weights == pytest.approx(self.stacked.weights, rel=AGREE, abs=AGREE)
+        by_mode = np.repeat(sigma, self.lanes.weights.shape[1], axis=0)
+        assert np.abs((self.lanes.means - self.stacked.means)[:, :9] / by_mode).max() < AGREE
+        for one, other in ((self.stacked.combine(), self.lanes.combine()), (self.stacked.stated(), self.lanes.stated())):
+            assert np.abs((other.mean - one.mean) / sigma).max() < AGREE
+            assert np.abs((other.covariance - one.covariance) / (sigma[:, :, None] * sigma[:, None])).max() < AGREE
+
+
+def offs(seed: int, k: int = 6, size: float = 10.0) -> Floats:
+    """Where measurements lie beside what is expected."""
+    return np.random.default_rng(seed).normal(0.0, size, (N, k))
+
+
+@pytest.mark.parametrize("estimator", ["imm", "rmimm"])
+def test_position_and_velocity_some_of_it_missing(estimator: str) -> None:
+    """After unequal times, a height or a velocity that nobody measured."""
+    both = Both.begin(gateways(estimator))
+    both.step(np.array([0.4, 1.0, 7.0]), offs(1), WHOLE, 25.0)
+    off = offs(2)
+    off[0, 2], off[1, 3:] = math.nan, math.nan
+    both.step(np.ones(N), off, WHOLE, 25.0, robust=3.0)
+
+
+def test_the_paper_s_three_modes_measured_by_each_mode_s_own_derivative() -> None:
+    """Nine states; sensitivities that differ from mode to mode, as a radar's do; transitions that are told."""
+    modes = rmimm.modes("rmimm")
+    both = Both.begin(modes)
+    towards = np.tile(rmimm.ALIGNED, (N, 1, 1))
+    own = np.random.default_rng(3).normal(0.0, 1.0, (N * 3, 3, 9))
+    both.step(np.ones(N), offs(4, 3), own, 100.0, transition=towards)
+    both.step(np.ones(N), offs(5, 3), own, 100.0)
+
+
+def test_what_lies_too_far_out_pulls_no_more_and_a_sure_measurement_keeps_its_digits() -> None:
+    """One outlier among three tracks; then one that is a million times as sure as the prediction."""
+    both = Both.begin(gateways())
+    off = offs(6)
+    off[1, 0] = 900.0
+    both.step(np.ones(N), off, WHOLE, 25.0, robust=3.0)
+    both.step(np.ones(N), offs(7, size=1e-2), WHOLE, 1e-5)
+
+
+def test_tracks_that_lag_behind_say_so() -> None:
+    """Innovations to one side, of one track: what lags add is in what is stated, and in what the next may scatter by."""
+    both = Both.begin(replace(gateways(), modes=gateways().modes[:2]))
+    off = np.zeros((N, 3))
+    off[1], off[2] = [45.0, 30.0, 0.0], [3.0, 1.0, 0.0]
+    alone = np.array([1.0, 0.0, 0.0])
+    for _ in range(3):
+        both.step(np.ones(N), off, WHOLE[:, :3], 25.0)
+    stated, own = both.lanes.stated().covariance, both.lanes.combine().covariance
+    assert alone @ stated[1, :3, :3] @ alone > 1.5 * alone @ stated[0, :3, :3] @ alone
+    assert own.shape == stated.shape == (N, 9, 9)
+
+
+def test_one_mode_is_a_kalman_filter() -> None:
+    """A set of a single mode, of a single track."""
+    one = Modes((Mode(0.0, Motion((1.0, 1.0, 0.5), 20.0)),), "imm")
+    both = Both.begin(one)
+    both.step(np.ones(N), offs(8), WHOLE, 25.0)
+    assert both.lanes.weights == pytest.approx(1.0)
+
+
+def test_literal_is_never_compiled_the_others_are_where_numba_is() -> None:
+    """Which way a batch goes."""
+    state = Estimate(np.zeros((2, 9)), np.tile(np.eye(9), (2, 1, 1)))
+    assert isinstance(tracks.begin(state, rmimm.modes("literal")), Stacked)
+    assert isinstance(tracks.begin(state, rmimm.modes("rmimm")), Lanes if packed.INSTALLED else Stacked)
+
+
+def test_blocks_hold_every_track_once_in_its_order() -> None:
+    """Whatever number of tracks, laid out and taken back."""
+    for n in (1, 2, 3, 7):
+        array = np.arange(n * 6.0).reshape(n, 2, 3)
+        plan = Layout.of(n)
+        assert (plan.rows(plan.laid(array)) == array).all()
+        assert plan.laid(array).shape == (plan.blocks, 2, 3, plan.width)
