@@ -12,7 +12,7 @@ from gateway.align import SECOND, Fix, ReckonedFix
 from gateway.making import Making
 from gateway.observation import GpsReport, Heard, Many, Observation, VehicleStatus
 from gateway.picture import Event
-from gateway.reckon import NOTHING, Easing, LastPlace, Reckoned, Reckoner, reads
+from gateway.reckon import USED, Easing, LastPlace, Reckoned, Reckoner, reads
 
 SURE_SIGMA = 6.0
 TURNED_MPS2 = 10.0  # the acceleration may have changed by so much since dead reckoning came so far
@@ -40,15 +40,16 @@ class Believing(Making):
         if not self.reckoners.denies(fix.aircraft, fix.at) and self._is_frozen(report, fix.at):
             return None
         expected = None
-        if fix.aircraft in self.consistency.contradicted:
+        if fix.aircraft in self.consistency.contradicted - self.reckoners.doubted:
             self._begin_motion_anew(fix.aircraft)
         elif fix.aircraft in self.reckoners.by_aircraft:
             self.reckoners = self.reckoners.placed(fix.aircraft, fix.at, self._place_of(fix, report))
             expected = self.reckoners.of(fix.aircraft, fix.at)
         if expected is None:
             return fix
-        if self.site.dead_reckoning.refuses and (expected.denied != NOTHING or self._is_denied(fix, expected)):
-            if expected.denied == NOTHING:
+        is_denied = expected.denied not in USED
+        if self.site.dead_reckoning.refuses and (is_denied or self._is_denied(fix, expected)):
+            if not is_denied:
                 self.reckoners = self.reckoners.suspecting(fix.aircraft)
             self.count("GPS reports that inertial data deny")
             return None

@@ -12,7 +12,7 @@ from gateway.estimators.kalman import ERROR, POSITION
 from gateway.fuse import Lane
 from gateway.fusing import Fusing
 from gateway.picture import Event
-from gateway.reckon import DISAGREES, JUMPED, NOTHING, Reckoned, Reckoners
+from gateway.reckon import DISAGREES, JUMPED, NOTHING, USED, VELOCITY_JUMPED, VELOCITY_ONLY, Reckoned, Reckoners
 
 SERIAL = -2  # of what was not heard
 GPS_GONE_S = 3.0  # without a position for so long a radar shows dead reckoning where the vehicle is
@@ -47,7 +47,7 @@ class Reckoning(Fusing):
                 continue
             self.reckoned.append(found)
             self._tell_walks(found)
-            if found.denied != NOTHING and before.denied(aircraft) == NOTHING:
+            if found.denied not in USED and before.denied(aircraft) in USED:
                 # also what has come since the second, and has entered the track, is not believed
                 self._go_on(lane, self.reckoners.of(aircraft, now) or found, is_forced=True)
             elif lane.coasting_at(share.at, self.options):
@@ -106,6 +106,14 @@ class Reckoning(Fusing):
         now = self.reckoners.denied(aircraft)
         if before.denied(aircraft) == now:
             return
+        if now == VELOCITY_ONLY:
+            text = f"its velocity is not what its position moves by, and {self.reckoners.by(aircraft).words} deny it"
+            text = f"{aircraft}: {text}: what it says of its position is used, without its velocity until that fits"
+            self.events.append(Event(at, "warning", text))
+            return
+        if now == NOTHING and before.denied(aircraft) == VELOCITY_ONLY:
+            self.events.append(Event(at, "info", f"{aircraft}: its velocity fits its position again, and is used"))
+            return
         if now == NOTHING:
             known, sure = before.of(aircraft, reckoned_at), ""
             if known is not None:  # what walked off so slowly agrees some time because little is known by then
@@ -117,6 +125,8 @@ class Reckoning(Fusing):
         how = f"jumped, which {by} deny" if now == JUMPED else f"walks off slowly, which {by} deny"
         if now == DISAGREES:
             how = "is not where its own velocities lead"
-        text = f"{aircraft}: what it says of its position {how}: it is not used"
+        if now == VELOCITY_JUMPED:
+            how = f"comes with a velocity that jumped, which {by} deny"
+        text = f"{aircraft}: what it says of its position {how}: it is not used until it agrees again"
         self.count("position sources denied")
         self.events.append(Event(at, "warning", text))

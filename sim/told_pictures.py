@@ -59,7 +59,7 @@ def denials(some: Iterable[Picture]) -> list[tuple[float, str]]:
     for picture in some:
         for event in picture.events:
             if "what it says of its position" in event.text:
-                word = "believed" if "agrees again" in event.text else "denied"
+                word = "believed" if "is used" in event.text else "denied"
                 found.append(((event.at - START) / SECOND - FALSE_FROM_S, word))
     return found
 

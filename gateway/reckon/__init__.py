@@ -11,7 +11,7 @@ Source: 002-4.
 from gateway.reckon.freezing import LastPlace
 from gateway.reckon.reckoned import Reckoned
 from gateway.reckon.reckoners import Easing, Reckoners
-from gateway.reckon.tip import DISAGREES, JUMPED, NOTHING, WALKED_OFF
+from gateway.reckon.tip import DISAGREES, JUMPED, NOTHING, USED, VELOCITY_JUMPED, VELOCITY_ONLY, WALKED_OFF
 from gateway.reckon.told import reads
 from gateway.reckon.vehicle import Reckoner
 
@@ -19,6 +19,9 @@ __all__ = [
     "DISAGREES",
     "JUMPED",
     "NOTHING",
+    "USED",
+    "VELOCITY_JUMPED",
+    "VELOCITY_ONLY",
     "WALKED_OFF",
     "Easing",
     "LastPlace",

@@ -4,6 +4,9 @@ A position, or a velocity, is compared with where the vehicle can be. The hypoth
 denies what jumps; those that went on without it for five to twenty seconds deny what walks off slowly. Either must be sure:
 six sigma of what they know and of what the source usually scatters by, and once more what good sources wander by. Where
 neither wings nor wheels hold the velocity, they must have proved as sure as they say (`proving`).
+
+Where only the velocity beside a position is denied, the position is refused with it: so begins what walks off with velocities
+to match. But what goes on where it can be, and not where its own velocities lead, is right, and these are left out.
 """
 
 from __future__ import annotations
@@ -22,6 +25,8 @@ from gateway.reckon.tip import (
     DISAGREES,
     JUMPED,
     NOTHING,
+    VELOCITY_JUMPED,
+    VELOCITY_ONLY,
     WALKED_OFF,
     Tip,
     hypothesis,
@@ -61,7 +66,9 @@ def judged(tip: Tip, place: Floats, late_s: Floats, held: Bools, unseen: Floats,
     height = np.where(np.isnan(place[:, None, 2]), motion.height_m, place[:, None, 2])
     latitude, longitude, _ = told
     off = between(latitude, longitude, height, motion) + motion.velocity_mps * late
-    faster = place[:, None, 3:6] + tip.accelerated_mps2[:, None] * late - motion.velocity_mps
+    told_faster = place[:, None, 3:6] + tip.accelerated_mps2[:, None] * late - motion.velocity_mps
+    parted = tip.denied == VELOCITY_ONLY
+    faster = _of_believed(told_faster, tip)
     worst = _square(off[..., :2], faster[..., :2], tip)
     tip, walked, square = followed(tip, place, late_s)
     refuses = np.array(settings.refuses)
@@ -73,31 +80,58 @@ def judged(tip: Tip, place: Floats, late_s: Floats, held: Bools, unseen: Floats,
     old = tip.cell[:, None] - tip.seeded[:, 1:] >= OLD_ENOUGH
     bound = np.where(held, WALKED, UNHELD * WALKED * np.maximum(tip.times, 1.0))
     walks = (trusted & (held | is_proved(tip)))[:, None] & old & (worst[:, 1:] > bound[:, None])
-    disagrees = walks_away(tip, square) & refuses
-    refused = tip.denied != NOTHING
-    still = (tip.denied != JUMPED) & walks_still(tip, square)
-    agreed = np.where(refused & (worst[:, 0] < NEAR) & ~still, tip.agreed + 1, 0)
-    returns = refused & (agreed >= AGREES_FOR)
+    disagrees = walks_away(tip, square) & refuses & ~parted[:, None]
+    refused, began_to_walk = tip.refused, tip.denied == VELOCITY_JUMPED
+    placed, sped = _apart(off[:, :1, :2], told_faster[:, :1, :2], tip, jumps | parted | began_to_walk)
+    leaves = walks_still(tip, square)
+    parts = began_to_walk & (placed < NEAR) & (sped > FAR) & leaves
+    joins = parted & (sped < NEAR) & ~leaves
+    near = refused & (worst[:, 0] < NEAR) & ~(leaves & (tip.denied != JUMPED) & ~began_to_walk)
+    agreed = np.where(near | parts | joins, tip.agreed + 1, 0)
+    returns = (agreed >= AGREES_FOR) & ~parts
     by_unit = walks.any(axis=1)
     newly = ~refused & (jumps | by_unit | disagrees.any(axis=1))
-    why = np.where(jumps, JUMPED, np.where(by_unit, WALKED_OFF, DISAGREES))
-    denied = np.where(newly, why, np.where(refused & ~returns, tip.denied, NOTHING))
+    jumped = np.where(placed < NEAR, VELOCITY_JUMPED, JUMPED)
+    why = np.where(jumps, jumped, np.where(by_unit, WALKED_OFF, DISAGREES))
+    settled = np.where(agreed >= AGREES_FOR, np.where(parts, VELOCITY_ONLY, NOTHING), tip.denied)
+    denied = np.where(newly, why, settled)
     state = _of_the_oldest(tip, walks, newly & ~jumps & by_unit)
     state = _walked_back(replace(tip, state=state), walked, disagrees, newly & ~jumps & ~by_unit)
     tip = compared(replace(tip, state=state, denied=denied, agreed=agreed), worst, old, unseen, trusted)
     tip = forgotten(replace(tip, told_from_mps=_told_from(tip, bound)), returns)
-    accepted = np.flatnonzero(denied == NOTHING)
+    accepted = np.flatnonzero(~tip.refused)
     if not len(accepted):
         return tip
-    return tip.put(accepted, _worked_in(tip.taken(accepted), off[accepted, 0], faster[accepted, 0], place[accepted]))
+    faster = _of_believed(told_faster, tip)[accepted, 0]
+    return tip.put(accepted, _worked_in(tip.taken(accepted), off[accepted, 0], faster, place[accepted]))
+
+
+def _of_believed(faster: Floats, tip: Tip) -> Floats:
+    """Velocities (n, h, 3) without those that are left out."""
+    return np.where((tip.denied == VELOCITY_ONLY)[:, None, None], np.nan, faster)
+
+
+def _apart(off: Floats, faster: Floats, tip: Tip, which: Bools) -> tuple[Floats, Floats]:
+    """Of some vehicles the squares of positions alone and of velocities alone (n,), by the first hypothesis; of others NaN."""
+    placed, sped = np.full((2, len(tip)), np.nan)
+    rows = np.flatnonzero(which)
+    if len(rows):
+        scatter = _expected(tip.taken(rows), ~np.isnan(faster[rows, :, :1]))[:, 0]
+        for square, told, one in ((placed, off, slice(0, 2)), (sped, faster, slice(2, 4))):
+            square[rows] = _normalised(told[rows, 0], scatter[:, one, one])
+    return placed, sped
+
+
+def _normalised(off: Floats, covariance: Floats) -> Floats:
+    """Squared Mahalanobis distances (...) of vectors (..., k)."""
+    return np.asarray(np.sum(off * np.linalg.solve(covariance, off[..., None])[..., 0], axis=-1))
 
 
 def _square(off: Floats, faster: Floats, tip: Tip) -> Floats:
     """Squared Mahalanobis distances (n, h) of level positions and velocities (n, h, 2); a velocity that was not told is none."""
     has_velocity = ~np.isnan(faster[..., :1])
     both = np.concatenate([off, np.where(has_velocity, faster, 0.0)], axis=-1)
-    scatter = _expected(tip, has_velocity)
-    return np.asarray(np.sum(both * np.linalg.solve(scatter, both[..., None])[..., 0], axis=-1))
+    return _normalised(both, _expected(tip, has_velocity))
 
 
 def _expected(tip: Tip, has_velocity: Bools) -> Floats:

@@ -20,6 +20,14 @@ Floats = NDArray[np.float64]
 
 JERKED_MPS2 = 3.0  # by a second later the acceleration may be another by this
 WIND_KNOWN_MPS = 3.0  # a wind that is less sure than this is not told
+WORDS = (
+    "believed",
+    "refused: they jumped",
+    "refused: they walk off",
+    "refused: they leave their velocity",
+    "refused: their velocity jumped",
+    "believed, without their velocity",
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +44,7 @@ class Reckoned:
     velocity_sigma_mps: Floats  # (3,)
     wind_mps: Floats  # (2,) NaN = not known
     scatter_m: float  # of its position source, level, an axis
-    denied: int  # why its position source is refused: `tip.NOTHING`, JUMPED, WALKED_OFF
+    denied: int  # what is refused of its positions, and why: `tip.NOTHING`, JUMPED, …
     heard_at: int  # when a position was worked in last
     told_from_mps: float  # the slowest walk with velocities to match that it denies; NaN = not known
     trusted: bool  # it has learnt its own errors
@@ -56,10 +64,7 @@ class Reckoned:
             readings.append(("wind found from, degrees", math.degrees(math.atan2(-east, -north)) % 360.0))
         if not math.isnan(self.told_from_mps):
             readings.append(("tells walks from, m/s", self.told_from_mps))
-        denied = ("believed", "refused: they jumped", "refused: they walk off", "refused: they leave their velocity")[
-            self.denied
-        ]
-        return tuple(readings), (("positions", denied),)
+        return tuple(readings), (("positions", WORDS[self.denied]),)
 
 
 def reckoned(aircraft: str, tip: Tip, at: int, denied: int) -> Reckoned:

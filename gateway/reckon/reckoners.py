@@ -20,7 +20,7 @@ from gateway.reckon.freezing import LastPlace
 from gateway.reckon.kinds import By, Kinds
 from gateway.reckon.reckoned import Floats, Reckoned, reckoned, wind_mps
 from gateway.reckon.running import run
-from gateway.reckon.tip import NOTHING
+from gateway.reckon.tip import NOTHING, VELOCITY_ONLY
 from gateway.reckon.told import INERTIAL, PLACE, Series, Told, before, by_share, carrying, portioned, tells_motion
 from gateway.reckon.vehicle import Reckoner, begun_or_kept, pruned, untouched, with_portion
 from gateway.settings import DeadReckoning
@@ -70,6 +70,7 @@ class Reckoners:
     planned: tuple[tuple[int, Share], ...] = ()  # when which vehicles go on
     easings: Mapping[str, Easing] = field(default_factory=dict)
     told_last: Mapping[str, LastPlace] = field(default_factory=dict)  # of vehicles that are not followed
+    doubted: frozenset[str] = frozenset()  # of whom positions are believed, and not the velocities beside them
     crowded: bool = False  # more tell of their motion than are followed
 
     def hearing(self, added: int, observations: Sequence[Observation]) -> Reckoners:
@@ -189,7 +190,9 @@ class Reckoners:
         kept = {aircraft: pruned(one, share.at - history_ns, settings) for aircraft, one in changed.items()}
         gone = {aircraft for aircraft, one in kept.items() if self._tells_nothing(aircraft, one.told)}
         alive = {name: one for name, one in {**self.by_aircraft, **kept}.items() if name not in gone}
-        return replace(self, by_aircraft=alive, planned=tuple(planned))
+        after = replace(self, by_aircraft=alive, planned=tuple(planned))
+        doubted = (name for name in share.names if after.denied(name) == VELOCITY_ONLY)
+        return replace(after, doubted=self.doubted.difference(share.names).union(doubted))
 
     def _tells_nothing(self, aircraft: str, told: Told) -> bool:
         """Whether a vehicle is not heard any more of how it moves."""

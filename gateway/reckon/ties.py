@@ -16,7 +16,7 @@ from gateway.estimators.inertial import between, displaced
 from gateway.reckon.cells import BLOCK, CELL_S, SECOND_CELLS, Block
 from gateway.reckon.judging import FAR
 from gateway.reckon.kinds import Kinds
-from gateway.reckon.tip import NOTHING, Tip, with_each
+from gateway.reckon.tip import Tip, with_each
 from gateway.reckon.told import true_airspeed_mps
 from gateway.settings import DeadReckoning
 
@@ -79,7 +79,7 @@ def with_altitude(tip: Tip, told: Block, cell: int, settings: DeadReckoning) -> 
         return tip
     known, altitude = tip.above_m[rows], told.altitude[rows]
     off = tip.state.motion.height_m[rows, 0] - altitude
-    learns = (cell - tip.heard[rows] <= 2 * SECOND_CELLS) & (tip.denied[rows] == NOTHING)
+    learns = (cell - tip.heard[rows] <= 2 * SECOND_CELLS) & ~tip.refused[rows]
     share = BLOCK * CELL_S / LASTS_S
     above = tip.above_m.copy()
     above[rows] = np.where(np.isnan(known), np.where(learns, off, np.nan), known + learns * share * (off - known))

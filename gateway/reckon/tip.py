@@ -23,7 +23,9 @@ Bools = NDArray[np.bool_]
 BRANCHES = 4
 SEEDED_EVERY = 50  # cells
 HYPOTHESES = 1 + BRANCHES
-NOTHING, JUMPED, WALKED_OFF, DISAGREES = range(4)  # the last: with the velocity beside it
+NOTHING, JUMPED, WALKED_OFF, DISAGREES, VELOCITY_JUMPED, VELOCITY_ONLY = range(6)
+"""What is refused of positions, and why. DISAGREES: with their velocities; VELOCITY_ONLY: these are, positions are not."""
+USED = (NOTHING, VELOCITY_ONLY)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,8 +40,8 @@ class Tip:
     scatter_m2: Floats  # (n,) of positions about the filter, level, an axis
     scatter_mps2: Floats  # (n,) and of velocities
     above_m: Floats  # (n,) of heights over the altitudes that are told beside; NaN = not known
-    denied: Ints  # (n,) why positions are refused; NOTHING = they are not
-    agreed: Ints  # (n,) how many that are refused have agreed in a row
+    denied: Ints  # (n,) what is refused of positions, and why
+    agreed: Ints  # (n,) how many of which something is refused have agreed in a row
     accelerated_mps2: Floats  # (n, 3) north, east, down, in the last cell
     proved: Ints  # (n,) comparisons of good positions with the oldest hypothesis
     times: Floats  # (n,) the mean square that they were off by, of what is expected
@@ -53,6 +55,11 @@ class Tip:
 
     def __len__(self) -> int:
         return len(self.cell)
+
+    @property
+    def refused(self) -> Bools:
+        """Of which vehicles positions are refused (n,)."""
+        return ~np.isin(self.denied, USED)
 
     def taken(self, rows: Ints) -> Tip:
         """Some of the vehicles."""

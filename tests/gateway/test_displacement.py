@@ -191,7 +191,7 @@ def test_positions_beside_wrong_velocities_are_not_denied_by_inertial_data(every
     events = [event.text for picture in some for event in picture.events]
     assert any("read as m/s: its velocities are left out" in text for text in events)
     assert not any("it is not used" in text for text in events)
-    last = errors_m(teller, some)[-3:]
+    last = errors_m(teller, some)[-2:]
     assert {by for _, by, _, _ in last} == {"gps"}
     assert max(off for _, _, off, _ in last) < 25.0
 

@@ -49,6 +49,11 @@ def jumps(time_s: float) -> tuple[float, float, float, float]:
     return (30.0, 40.0, 0.0, 0.0) if FALSE_FROM_S < time_s <= FALSE_FROM_S + 20.0 else (0.0, 0.0, 0.0, 0.0)
 
 
+def told_too_fast(time_s: float) -> tuple[float, float, float, float]:
+    """Good positions, whose velocities are wrong by 15 m/s for ten seconds."""
+    return (0.0, 0.0, 9.0, 12.0) if FALSE_FROM_S < time_s <= FALSE_FROM_S + 10.0 else (0.0, 0.0, 0.0, 0.0)
+
+
 @cache
 def ran(kind: str, falsified: Falsified, dead_reckoning: Literal["on", "off"] = "on") -> tuple[Picture, ...]:
     """A ride, seen through to its end."""
@@ -109,6 +114,21 @@ def test_what_agrees_again_is_believed_again() -> None:
     (_, first), (since_s, second) = denials(ran("aeroplane", jumps))
     assert (first, second) == ("denied", "believed")
     assert 20.0 < since_s < 28.0
+
+
+def test_good_positions_whose_velocities_turn_wrong_are_used_without_them_until_these_fit_again() -> None:
+    some = ran("aeroplane", told_too_fast)
+    (_, first), (since_s, second) = denials(some)
+    assert (first, second) == ("denied", "believed")
+    assert 5.0 <= since_s <= 8.0  # so begins a walk with velocities to match, too
+    again = [
+        (one.at - START) / SECOND - FALSE_FROM_S for picture in some for one in picture.events if "fits" in one.text
+    ]
+    assert len(again) == 2  # said when they are left out, and when they are not any more
+    assert 15.0 <= again[1] <= 28.0
+    rows = errors_m(told("aeroplane", told_too_fast)[0], some)
+    assert max(off for row_s, _, off, _ in rows if row_s > -20.0) < 10.0
+    assert {by for row_s, by, _, _ in rows if row_s > since_s + 1.0} == {"gps"}
 
 
 def test_of_good_positions_none_is_refused_and_none_is_changed() -> None:
