@@ -88,15 +88,20 @@ def update_with_fixes(
     model: Model,
 ) -> tuple[Estimate, Innovation, Floats]:
     """States after GPS reports; arrays as in `start_from_fixes`; memory (n, w, 3) of past position innovations."""
-    sensitivity = _FIX_WITH_ERROR if model.motion.error_sigma_m else _FIX
-    innovation = np.concatenate([position - _expected(state, model), velocity - state.mean[:, VELOCITY]], axis=1)
+    innovation, sensitivity = told_by_fixes(state.mean, position, velocity, model)
     return _weighed(state, innovation, sensitivity, sigma, velocity_sigma, memory, model)
 
 
-def _expected(state: Estimate, model: Model) -> Floats:
+def told_by_fixes(mean: Floats, position: Floats, velocity: Floats, model: Model) -> tuple[Floats, Floats]:
+    """Innovations (n, 6) of GPS reports of tracks whose means (n, 9) are, and their derivative (1, 6, 9) by the state."""
+    sensitivity = _FIX_WITH_ERROR if model.motion.error_sigma_m else _FIX
+    return np.concatenate([position - _expected(mean, model), velocity - mean[:, VELOCITY]], axis=1), sensitivity
+
+
+def _expected(mean: Floats, model: Model) -> Floats:
     """Where position sources should say that the tracks are, (n, 3): with their error, where one is allowed."""
-    place = state.mean[:, POSITION]
-    return place + state.mean[:, ERROR] if model.motion.error_sigma_m else place
+    place = mean[:, POSITION]
+    return place + mean[:, ERROR] if model.motion.error_sigma_m else place
 
 
 def _weighed(
@@ -144,7 +149,8 @@ def update_in_part(
     if model.motion.error_sigma_m:
         sensitivity[:, :3, ERROR] = axes
     off = np.concatenate(
-        [_along(axes, position - _expected(state, model)), velocity - _along(axes, state.mean[:, VELOCITY])], axis=1
+        [_along(axes, position - _expected(state.mean, model)), velocity - _along(axes, state.mean[:, VELOCITY])],
+        axis=1,
     )
     off[~has_height, 2] = math.nan
     after, told, memory = _weighed(state, off, sensitivity, sigma, velocity_sigma, memory, model)
@@ -171,11 +177,16 @@ def update_with_plots(
     state: Estimate, polar: Floats, sigma: Floats, frame: RadarFrame, together: int = 1
 ) -> tuple[Estimate, Innovation]:
     """States after plots of one radar: polar and sigma (n, 3), NaN components are left out. Source: 003 2.4 eq 17 to 20."""
-    xyz = frame.from_enu(state.mean[:, POSITION])
-    innovation = polar_difference(polar, polar_from_xyz(xyz))
+    innovation, sensitivity = told_by_plots(state.mean, polar, frame)
+    return update(state, innovation, sensitivity, sigma * sigma, ROBUST_SIGMA, together)
+
+
+def told_by_plots(mean: Floats, polar: Floats, frame: RadarFrame) -> tuple[Floats, Floats]:
+    """Innovations (n, 3) of one radar's plots of tracks whose means (n, 9) are, and their derivatives (n, 3, 9) by the state."""
+    xyz = frame.from_enu(mean[:, POSITION])
     sensitivity = np.zeros((len(polar), 3, SIZE))
     sensitivity[:, :, POSITION] = polar_jacobian(xyz) @ frame.radar_from_enu
-    return update(state, innovation, sensitivity, sigma * sigma, ROBUST_SIGMA, together)
+    return polar_difference(polar, polar_from_xyz(xyz)), sensitivity
 
 
 def update_literally(

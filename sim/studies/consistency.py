@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from gateway.estimators import modes
-from gateway.estimators.kalman import Estimate, Innovation, predict
+from gateway.estimators.batch.tracks import begin
+from gateway.estimators.kalman import predict, update
 from gateway.fuse.starting import start_from_fixes
-from gateway.fuse.weighting import Model, update_with_fixes, update_with_plots
+from gateway.fuse.weighting import ROBUST_SIGMA, Model, told_by_fixes, told_by_plots
 from gateway.settings import Estimation, EstimatorName, Options
 from sim.studies import Progress, Study, Table, silent
 from sim.studies.ensembles import Ensemble, Step, approach, traffic, two_turns
@@ -133,24 +133,24 @@ def follow(ensemble: Ensemble, model: Model) -> Followed:
     sigmas = _sigmas(ensemble)
     place, sigma = np.where(np.isnan(first.value), 0.0, first.value), np.tile(sigmas[0], (runs, 1))
     state = start_from_fixes(place, sigma[:, :3], first.velocity, sigma[:, 3], model)
-    mixture = None if model.modes is None else modes.begin(state, model.modes)
+    batch = None if model.modes is None else begin(state, model.modes)
     at_s, off, nees, nis, degrees = first.at_s, [], [], [], []
     for step in ensemble.steps[1:]:
         elapsed_s, at_s = np.full(runs, step.at_s - at_s), step.at_s
-        if mixture is None or model.modes is None:
-            state, told = _updated(predict(state, elapsed_s, model.motion), step, sigmas[step.radar], model)
+        sigma = sigmas[step.radar]
+        if batch is None:
+            state = predict(state, elapsed_s, model.motion)
+            state, told = update(state, *_told(state.mean, step, sigma, model), ROBUST_SIGMA)
             innovation, scatter = told.innovation, told.covariance
         else:
-            mixture = modes.predict(mixture, elapsed_s, model.modes)
-            after, told = _updated(mixture.each(), step, sigmas[step.radar], model)
-            mixture, in_all = modes.weigh(mixture, after, told, model.modes)
-            state, innovation, scatter = modes.stated(mixture), in_all.innovation, in_all.scatter
-        measured = told.measured[:: model.together]
+            batch = batch.predict(elapsed_s)
+            batch, innovation, scatter = batch.update(*_told(batch.means, step, sigma, model), ROBUST_SIGMA)
+            state = batch.stated()
         wrong = state.mean[:, :axes] - step.true_enu_m[:axes]
         off.append(wrong)
         nees.append(_normalised(wrong, state.covariance[:, :axes, :axes]))
         nis.append(_normalised(innovation, scatter))
-        degrees.append(measured.sum(axis=1))
+        degrees.append(_measured(step).sum(axis=1))
     times = np.array([step.at_s for step in ensemble.steps[1:]])
     return Followed(times, np.array(off), np.array(nees), np.array(nis), np.array(degrees))
 
@@ -164,15 +164,18 @@ def _sigmas(ensemble: Ensemble) -> dict[int, Floats]:
     return sigmas
 
 
-def _updated(state: Estimate, step: Step, sigma: Floats, model: Model) -> tuple[Estimate, Innovation]:
-    """States of all runs (and modes) after a step."""
-    m, rows = model.together, len(state.mean)
-    value, sigmas = np.repeat(step.value, m, axis=0), np.tile(sigma, (rows, 1))
+def _told(means: Floats, step: Step, sigma: Floats, model: Model) -> tuple[Floats, Floats, Floats]:
+    """What a step measured of all runs, by each mode's mean: innovations, their derivatives by the state, variances."""
+    value, variance = np.repeat(step.value, model.together, axis=0), np.tile(sigma * sigma, (len(means), 1))
     if step.radar:
-        return update_with_plots(state, value, sigmas, model.radars[step.radar], m)
-    velocity, memory = np.repeat(step.velocity, m, axis=0), np.zeros((rows, 0, 3))
-    after, told, _ = update_with_fixes(state, value, sigmas[:, :3], velocity, sigmas[:, 3], memory, model)
-    return after, told
+        return *told_by_plots(means, value, model.radars[step.radar]), variance
+    velocity = np.repeat(step.velocity, model.together, axis=0)
+    return *told_by_fixes(means, value, velocity, model), variance
+
+
+def _measured(step: Step) -> Bools:
+    """Which components a step measured of each run."""
+    return np.asarray(~np.isnan(step.value if step.radar else np.concatenate([step.value, step.velocity], axis=1)))
 
 
 def _normalised(off: Floats, covariance: Floats) -> Floats:

@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators import intent
+from gateway.estimators.batch.tracks import Tracks as Batch
+from gateway.estimators.batch.tracks import begin
 from gateway.estimators.kalman import SIZE, Estimate, Motion, start
-from gateway.estimators.modes import Mixture, Mode, Modes, Rule, begin, combine, predict, update
+from gateway.estimators.modes import Mode, Modes, Rule
 from sim.studies import Progress, Study, Table, silent
 
 Floats = NDArray[np.float64]
@@ -177,17 +179,16 @@ def filtered(flight: Flight, rule: Rule, *, known_point: bool = False) -> Tracks
     sensitivity = np.zeros((1, measured, SIZE))
     sensitivity[0, np.arange(measured), [0, 1, 3, 4][:measured]] = 1.0
     variance = np.tile(flight.sigma**2, (runs * chosen.count, 1))
-    mixture, second = begin(flight.start, chosen), np.ones(runs)
+    batch, second = begin(flight.start, chosen), np.ones(runs)
     means, nees, probability = [], [], []
     for step, told in enumerate(flight.measured):
-        transition = _towards(mixture, flight.points[step]) if known_point else None
-        mixture = predict(mixture, second, chosen, transition)
-        rows = mixture.each()
-        innovation = np.repeat(told, chosen.count, axis=0) - (sensitivity @ rows.mean[:, :, None])[:, :, 0]
-        mixture, _ = update(mixture, innovation, sensitivity, variance, chosen)
-        state = combine(mixture)
+        transition = _towards(batch, flight.points[step]) if known_point else None
+        batch = batch.predict(second, transition)
+        innovation = np.repeat(told, chosen.count, axis=0) - (sensitivity @ batch.means[:, :, None])[:, :, 0]
+        batch, _, _ = batch.update(innovation, sensitivity, variance)
+        state = batch.combine()
         means.append(state.mean)
-        probability.append(mixture.weight)
+        probability.append(batch.weights)
         off = (state.mean[:, _LEVEL] - np.concatenate([flight.position[step], flight.velocity[step]]))[:, :, None]
         inverse = np.linalg.inv(state.covariance[:, _LEVEL][:, :, _LEVEL])
         nees.append((off.transpose(0, 2, 1) @ inverse @ off)[:, 0, 0])
@@ -197,9 +198,9 @@ def filtered(flight: Flight, rule: Rule, *, known_point: bool = False) -> Tracks
 _LEVEL = [0, 1, 3, 4]
 
 
-def _towards(mixture: Mixture, point: Floats) -> Floats:
+def _towards(batch: Batch, point: Floats) -> Floats:
     """Transitions (n, m, m) over a second with a known point: who flies at it goes straight. Source: 000 2.2, feedback."""
-    state = combine(mixture)
+    state = batch.combine()
     off = intent.off_course(state.mean[:, :2], state.mean[:, 3:5], point[None, None])
     aligned = np.abs(off[:, 0]) <= intent.ALIGNED_RAD
     return np.where(aligned[:, None, None], ALIGNED, NOT_ALIGNED)

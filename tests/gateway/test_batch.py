@@ -92,7 +92,10 @@ class Both:
         assert self.lanes.weights == pytest.approx(self.stacked.weights, rel=AGREE, abs=AGREE)
         by_mode = np.repeat(sigma, self.lanes.weights.shape[1], axis=0)
         assert np.abs((self.lanes.means - self.stacked.means)[:, :9] / by_mode).max() < AGREE
-        for one, other in ((self.stacked.combine(), self.lanes.combine()), (self.stacked.stated(), self.lanes.stated())):
+        for one, other in (
+            (self.stacked.combine(), self.lanes.combine()),
+            (self.stacked.stated(), self.lanes.stated()),
+        ):
             assert np.abs((other.mean - one.mean) / sigma).max() < AGREE
             assert np.abs((other.covariance - one.covariance) / (sigma[:, :, None] * sigma[:, None])).max() < AGREE
 
