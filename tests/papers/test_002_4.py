@@ -111,6 +111,14 @@ def test_gyros_biases_read_off_attitudes_that_turn_wrongly_for_long_are_as_sure_
     assert np.median(sigmas) <= math.radians(0.1)
 
 
+def test_a_jump_is_refused_from_twenty_seconds_after_positions_began() -> None:
+    """50 m of a car, an aeroplane, a copter and a boat, whose velocities do not lead there, are denied in a second."""
+    step = lambda time_s: (30.0, 40.0, 0.0, 0.0) if time_s > 22.0 else (0.0, 0.0, 0.0, 0.0)  # noqa: E731
+    ran = denial.ran(4, 5, 26.0, step, (*denial.TELL_WALKS, *denial.UNHELD))
+    after_s = [denial.FALSE_FROM_S - 22.0 + one for one in ran.denied_after_s()]
+    assert all(0.0 < one <= 1.0 for one in after_s)
+
+
 def test_a_boat_in_waves_whose_position_leaves_its_velocity_is_refused() -> None:
     """2 m/s within 12 s, by the velocity that is told beside it."""
     (after_s,) = denial.ran(1, 31, 115.0, denial.silent_walk, denial.UNHELD[1:]).denied_after_s()
