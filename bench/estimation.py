@@ -17,6 +17,7 @@ from bench.measure import Figure, alone
 
 BATCH_RATIO, ONE_RATIO = 60.0, 1.0
 AGREE = 1e-9
+OURS = ("ours", "ours, compiled")
 
 
 def estimation(runs: int, say: Callable[[str], None]) -> list[Figure]:
@@ -26,17 +27,21 @@ def estimation(runs: int, say: Callable[[str], None]) -> list[Figure]:
         say(sentence)
     figures = []
     for size, rates in told["rates"].items():
-        least = ONE_RATIO if size == "one track" else BATCH_RATIO
         figures += [Figure(f"IMM, {size}: {side}", "1/s", tuple(samples)) for side, samples in rates.items()]
-        for side, samples in rates.items():
-            if side != "ours":
-                ratio = tuple(one / other for one, other in zip(rates["ours"], samples, strict=True))
-                figures.append(
-                    Figure(f"… ours / {side}", "", ratio, at_least=least if side == "textbook loop" else None)
-                )
+        for mine in OURS:
+            for side in [name for name in rates if name not in OURS and mine in rates]:
+                ratio = tuple(one / other for one, other in zip(rates[mine], rates[side], strict=True))
+                figures.append(Figure(f"… {mine} / {side}", "", ratio, at_least=_asked(mine, side, size, rates)))
     for side, off in told["off"].items():
         figures.append(Figure(f"IMM: {side} differs from ours by", "1e-12", (off * 1e12,), AGREE * 1e12))
     return figures
+
+
+def _asked(mine: str, side: str, size: str, rates: dict[str, Any]) -> float | None:
+    """The least ratio that is asked for, of the way that goes with a size: in batches the compiled one, where it is there."""
+    if side != "textbook loop" or (mine != OURS[-1] and size != "one track" and OURS[-1] in rates):
+        return None
+    return ONE_RATIO if size == "one track" else BATCH_RATIO
 
 
 if __name__ == "__main__":

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from bench.estimation_sides import ERROR_M, PEERS, Problem, Run, gateway_modes, ours, textbook
+from bench.estimation_sides import ERROR_M, PEERS, Problem, Run, compiled, gateway_modes, ours, textbook
+from gateway.estimators.batch import packed
 from gateway.estimators.kalman import Estimate
 from gateway.estimators.modes import begin, moved
 
+COMPILED = "ours, compiled"
 CALM, LEFT = 0, 3  # places of the modes that are flown
 ONE_STEPS, MANY, MANY_STEPS = 300, 1000, 3
 SIGMA_M = 25.0
@@ -48,6 +50,10 @@ def measure(runs: int) -> dict[str, Any]:
     """Everything in this process, side after side, again and again."""
     sides = {"ours": ours, "textbook loop": textbook}
     left_out = []
+    if packed.INSTALLED:
+        sides[COMPILED] = compiled
+    else:
+        left_out.append("the compiled batch is left out: pip install 'talkdown[fast]'")
     for name, (side, module, package) in PEERS.items():
         if importlib.util.find_spec(module) is None:
             left_out.append(f"{name} is not installed, it is left out: pip install {package}")

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.estimators.batch import tracks
 from gateway.estimators.holding import Held
 from gateway.estimators.kalman import Estimate, Motion
 from gateway.estimators.modes import Modes, begin, combine, predict, update
@@ -77,6 +78,27 @@ def ours(problem: Problem) -> Run:
             off = report - (seen @ mixture.each().mean[:, :, None])[:, :, 0]
             mixture, _ = update(mixture, off, seen[None], variance, modes)
             state = combine(mixture)
+        return state.mean, state.covariance
+
+    return run
+
+
+def compiled(problem: Problem) -> Run:
+    """The same filter compiled, as studies of many draws have it."""
+    modes, n = gateway_modes(), len(problem.mean)
+    spread = np.repeat(problem.covariance[None, :9, :9], n, axis=0)
+    first = tracks.begin(Estimate(problem.mean[:, :9], spread), modes)
+    seen = problem.sensitivity[:, :9]
+    reports = np.repeat(problem.measured, modes.count, axis=1)
+    variance, second = np.full(reports.shape[1:], problem.variance), np.ones(n)
+
+    def run() -> States:
+        batch = first
+        for report in reports:
+            batch = batch.predict(second)
+            off = report - batch.means[:, :9] @ seen.T
+            batch, _, _ = batch.update(off, seen[None], variance)
+            state = batch.combine()
         return state.mean, state.covariance
 
     return run

@@ -35,10 +35,6 @@ class Shaken:
         by = {"": np.ones_like(level), "level": level, "upright": upright, "error": error_m2}
         return cls(level, fades, np.stack([share * by[what] for _, _, share, what in _ENTRIES], axis=1))
 
-    def only(self, some: Ints | NDArray[np.bool_]) -> Shaken:
-        """What shakes some of them."""
-        return Shaken(self.level[some], self.fades[some], self.scale[some])
-
 
 def carried(shaken: Shaken, elapsed_s: Floats, turn_rate: Floats, size: int = SIZE) -> tuple[Floats, Floats]:
     """Transition and noise (n, m, size, size) over times (n,) of m motions that turn at rates (n, m), rad/s, 0 = straight.
@@ -47,16 +43,8 @@ def carried(shaken: Shaken, elapsed_s: Floats, turn_rate: Floats, size: int = SI
     beyond the nine are left at 0.
     Source: 000 2.1.1 eq 3, 4, lost in the print: the coordinated turn of the literature, straight at a rate of 0.
     Deviation: the noise is of the time since the last update, not of a fixed period.
-    The different `entries` are taken to their places.
-    """
-    different = entries(shaken, elapsed_s, turn_rate)
-    return different.take(_CARRY[:size, :size], axis=-1), different.take(_NOISE[:size, :size], axis=-1)
-
-
-def entries(shaken: Shaken, elapsed_s: Floats, turn_rate: Floats) -> Floats:
-    """The different entries (n, m, 19) of transition and noise of `carried`, in the order of `_ENTRIES`.
-
-    Each is a power of the time, times a function of the angle, times what the motion is shaken by.
+    Each different entry is a power of the time, times a function of the angle, times what the motion is shaken by; then they
+    are taken to their places.
     """
     t = elapsed_s[:, None]
     angle = t * turn_rate
@@ -65,21 +53,21 @@ def entries(shaken: Shaken, elapsed_s: Floats, turn_rate: Floats) -> Floats:
     sine = np.sin(half)
     both = sine * np.cos(half)
     keep = np.exp(t * shaken.fades)
-    shapes = np.empty((*angle.shape, _SHAPES))
-    shapes[..., _FLAT] = 1.0
-    shapes[..., _SINC] = both / half
-    shapes[..., _SINC_HALF] = (sine / half) ** 2
-    shapes[..., _BEND] = _bend(amount, both)
-    np.multiply(shapes[..., _SINC:_BY_RATE], turn_rate[..., None], out=shapes[..., _BY_RATE:_COS])
-    shapes[..., _COS] = 1.0 - 2.0 * (sine * sine)
-    shapes[..., _KEPT] = keep
-    shapes[..., _LOST] = 1.0 - keep * keep
+    shapes = np.empty((*angle.shape, SHAPES))
+    shapes[..., FLAT] = 1.0
+    shapes[..., SINC] = both / half
+    shapes[..., SINC_HALF] = (sine / half) ** 2
+    shapes[..., BEND] = _bend(amount, both)
+    np.multiply(shapes[..., SINC:BY_RATE], turn_rate[..., None], out=shapes[..., BY_RATE:COS])
+    shapes[..., COS] = 1.0 - 2.0 * (sine * sine)
+    shapes[..., KEPT] = keep
+    shapes[..., LOST] = 1.0 - keep * keep
     square = t * t
     powers = np.concatenate([np.ones_like(t), t, square, square * t], axis=1)
-    different = shapes.take(_SHAPE, axis=-1)
-    different *= powers.take(_POWER, axis=1)[:, None]
-    different *= shaken.scale
-    return different
+    entries = shapes.take(SHAPE, axis=-1)
+    entries *= powers.take(POWER, axis=1)[:, None]
+    entries *= shaken.scale
+    return entries.take(_CARRY[:size, :size], axis=-1), entries.take(_NOISE[:size, :size], axis=-1)
 
 
 def _bend(angle: Floats, half_sine: Floats) -> Floats:
@@ -104,59 +92,59 @@ def _matrix(entries: Mapping[int, Sequence[tuple[int, int]]]) -> Ints:
 
 # functions of the angle a: 1, sin a / a, its square at a / 2, (a - sin a) / a^3, the last three times the rate, cos a; and of the
 # time alone what is left of the source's error, and what noise has put in place of it
-_SHAPES = 10
-_FLAT, _SINC, _SINC_HALF, _BEND, _BY_RATE, _ARC, _SWAY, _COS, _KEPT, _LOST = range(_SHAPES)
+SHAPES = 10
+FLAT, SINC, SINC_HALF, BEND, BY_RATE, ARC, SWAY, COS, KEPT, LOST = range(SHAPES)
 # each entry: function, power of the time, share, and of what
 _ENTRIES = (
-    (_FLAT, 0, 0.0, ""),
-    (_FLAT, 0, 1.0, ""),
-    (_SINC, 1, 1.0, ""),
-    (_ARC, 2, 0.5, ""),
-    (_ARC, 2, -0.5, ""),
-    (_FLAT, 1, 1.0, ""),
-    (_COS, 0, 1.0, ""),
-    (_BY_RATE, 1, 1.0, ""),
-    (_BY_RATE, 1, -1.0, ""),
-    (_KEPT, 0, 1.0, ""),
-    (_BEND, 3, 2.0, "level"),
-    (_SINC_HALF, 2, 0.5, "level"),
-    (_FLAT, 1, 1.0, "level"),
-    (_SWAY, 3, 1.0, "level"),
-    (_SWAY, 3, -1.0, "level"),
-    (_FLAT, 3, 1.0 / 3.0, "upright"),
-    (_FLAT, 2, 0.5, "upright"),
-    (_FLAT, 1, 1.0, "upright"),
-    (_LOST, 0, 1.0, "error"),
+    (FLAT, 0, 0.0, ""),
+    (FLAT, 0, 1.0, ""),
+    (SINC, 1, 1.0, ""),
+    (ARC, 2, 0.5, ""),
+    (ARC, 2, -0.5, ""),
+    (FLAT, 1, 1.0, ""),
+    (COS, 0, 1.0, ""),
+    (BY_RATE, 1, 1.0, ""),
+    (BY_RATE, 1, -1.0, ""),
+    (KEPT, 0, 1.0, ""),
+    (BEND, 3, 2.0, "level"),
+    (SINC_HALF, 2, 0.5, "level"),
+    (FLAT, 1, 1.0, "level"),
+    (SWAY, 3, 1.0, "level"),
+    (SWAY, 3, -1.0, "level"),
+    (FLAT, 3, 1.0 / 3.0, "upright"),
+    (FLAT, 2, 0.5, "upright"),
+    (FLAT, 1, 1.0, "upright"),
+    (LOST, 0, 1.0, "error"),
 )
-_SHAPE, _POWER = np.array([entry[0] for entry in _ENTRIES]), np.array([entry[1] for entry in _ENTRIES])
+SHAPE, POWER = np.array([entry[0] for entry in _ENTRIES]), np.array([entry[1] for entry in _ENTRIES])
 # of the transition
-_ONE, _ALONG, _ACROSS, _BACK, _TIME, _COSINE, _SINE, _RIGHT, _KEEP = range(1, 10)
+ONE, ALONG, ACROSS, BACK, TIME, COSINE, SINE, RIGHT, KEEP = range(1, 10)
 # of the noise: level position and velocity, alike on both axes, and what a turn makes of one axis on the other; upright
-_PLACE, _BOTH, _SPEED, _ASIDE, _OTHER, _HEIGHT, _CLIMBING, _CLIMB, _ERROR = range(10, len(_ENTRIES))
+PLACE, BOTH, SPEED, ASIDE, OTHER, HEIGHT, CLIMBING, CLIMB, ERROR = range(10, len(_ENTRIES))
 _ERRORS = [(6, 6), (7, 7), (8, 8)]
 _CARRY = _matrix(
     {
-        _ONE: [(0, 0), (1, 1), (2, 2), (5, 5)],
-        _ALONG: [(0, 3), (1, 4)],
-        _ACROSS: [(1, 3)],
-        _BACK: [(0, 4)],
-        _TIME: [(2, 5)],
-        _COSINE: [(3, 3), (4, 4)],
-        _SINE: [(4, 3)],
-        _RIGHT: [(3, 4)],
-        _KEEP: _ERRORS,
+        ONE: [(0, 0), (1, 1), (2, 2), (5, 5)],
+        ALONG: [(0, 3), (1, 4)],
+        ACROSS: [(1, 3)],
+        BACK: [(0, 4)],
+        TIME: [(2, 5)],
+        COSINE: [(3, 3), (4, 4)],
+        SINE: [(4, 3)],
+        RIGHT: [(3, 4)],
+        KEEP: _ERRORS,
     }
 )
 _NOISE = _matrix(
     {
-        _PLACE: [(0, 0), (1, 1)],
-        _BOTH: [(0, 3), (3, 0), (1, 4), (4, 1)],
-        _SPEED: [(3, 3), (4, 4)],
-        _ASIDE: [(0, 4), (4, 0)],
-        _OTHER: [(1, 3), (3, 1)],
-        _HEIGHT: [(2, 2)],
-        _CLIMBING: [(2, 5), (5, 2)],
-        _CLIMB: [(5, 5)],
-        _ERROR: _ERRORS,
+        PLACE: [(0, 0), (1, 1)],
+        BOTH: [(0, 3), (3, 0), (1, 4), (4, 1)],
+        SPEED: [(3, 3), (4, 4)],
+        ASIDE: [(0, 4), (4, 0)],
+        OTHER: [(1, 3), (3, 1)],
+        HEIGHT: [(2, 2)],
+        CLIMBING: [(2, 5), (5, 2)],
+        CLIMB: [(5, 5)],
+        ERROR: _ERRORS,
     }
 )

@@ -18,12 +18,14 @@ from gateway.estimators.actual_error import MANOEUVRE_SHARE
 from gateway.estimators.batch.correcting import corrected
 from gateway.estimators.batch.judging import judged
 from gateway.estimators.batch.layout import Layout
-from gateway.estimators.batch.moving import ENTRIES, SHIFT, mixed_and_moved
+from gateway.estimators.batch.moving import mixed_and_moved
+from gateway.estimators.batch.packed import Bools, Ints
 from gateway.estimators.batch.telling import together
-from gateway.estimators.holding import answers, turned, usual
+from gateway.estimators.holding import answers
 from gateway.estimators.kalman import SIZE, Estimate
 from gateway.estimators.mode_set import Modes
-from gateway.estimators.turning import entries
+from gateway.estimators.turning import POWER, SHAPE
+from gateway.geodesy import STANDARD_GRAVITY_MPS2
 
 Floats = NDArray[np.float64]
 
@@ -82,46 +84,26 @@ class Lanes:
         chance = self.layout.laid(self.modes.transition(elapsed_s) if transition is None else transition)
         mean, covariance, weight = (np.empty_like(part) for part in (self.mean, self.covariance, self.weight))
         error, now = np.empty_like(self.error), (self.mean, self.covariance, self.weight, self.error)
-        places, way, drawn, grown, holds = self._motion(elapsed_s)
-        after, share = (mean, covariance, weight, error), MANOEUVRE_SHARE
-        mixed_and_moved(*now, chance, transition is None, places, way, drawn, grown, holds, share, *after)
+        times, after = (self.layout.laid(elapsed_s), *self._held(elapsed_s)), (mean, covariance, weight, error)
+        floats, holds, places, set_of = _of_modes(self.modes)
+        mixed_and_moved(*now, chance, transition is None, *times, *floats, holds, *places, set_of, *after)
         return replace(
             self,
             mean=mean,
             covariance=covariance,
             weight=weight,
-            elapsed_s=self.elapsed_s + self.layout.laid(elapsed_s),
+            elapsed_s=self.elapsed_s + times[0],
             error=error,
             counted=self.weight * np.minimum(self.weight / self.modes.shares[:, None], 1.0),
         )
 
-    def _motion(self, elapsed_s: Floats) -> tuple[Floats, Floats, Floats, Floats, NDArray[np.bool_]]:
-        """How the modes move over times (n,) or (1,): the entries of transition and noise (b, m, 22, L), which way level noise
-        lies (b, m, 3, L), the usual lasting acceleration (b, 3, L), what its noise makes (b, 6, L), which modes hold it (m,).
-        """
-        blocks, m, _, width = self.mean.shape
-        laid, viewed, numbers, held = self.layout.laid, self.layout.viewed, self.modes.numbers, self.modes.acceleration
-        # Mixing leaves the mean of all modes where it is.
-        level = self.layout.rows(np.einsum("bml,bmal->bal", self.weight, self.mean[:, :, 3:5]))
-        speed = modes.speed_of(level)
-        course, straight = modes.course_of(level, speed), numbers.turn == 0.0
-        places, turning = np.empty((blocks, m, ENTRIES, width)), np.flatnonzero(~straight)
-        rate, none = self.modes.turn_rate(speed)[:, turning], np.zeros((len(elapsed_s), int(straight.sum())))
-        places[:, turning, :SHIFT] = viewed(entries(numbers.shaken.only(turning), elapsed_s, rate))
-        places[:, straight, :SHIFT] = viewed(entries(numbers.shaken.only(straight), elapsed_s, none))
-        places[:, :, SHIFT:] = 0.0
-        way = np.zeros((blocks, m, 3, width))
-        way[:, :, ::2] = 1.0
-        if len(numbers.uneven):
-            most = np.minimum(speed[:, None] * self.modes.turn_rate_rps / numbers.across, 1.0)
-            way[:, numbers.uneven] = viewed(_lower(turned(course, numbers.along, np.maximum(most, numbers.along))))
-        drawn, grown, holds = np.zeros((blocks, 3, width)), np.zeros((blocks, 6, width)), np.zeros(m, dtype=np.bool_)
-        if held is not None:
-            holds[list(numbers.holds)] = True
-            response, spread = answers(elapsed_s, held.lasts_s)
-            places[:, holds, SHIFT:] = viewed(response)[:, None]
-            drawn, grown = laid(_lower(usual(course, held))), laid(_lower(spread))
-        return places, way, drawn, grown, holds
+    def _held(self, elapsed_s: Floats) -> tuple[Floats, Floats]:
+        """What becomes of an acceleration that lasts over times (n,) or (1,): (b, 3, L) and, of its noise, (b, 6, L)."""
+        if self.modes.acceleration is None:
+            none = np.zeros((1, 6))
+            return self.layout.laid(none[:, :3]), self.layout.laid(none)
+        response, grown = answers(elapsed_s, self.modes.acceleration.lasts_s)
+        return self.layout.laid(response), self.layout.laid(_lower(grown))
 
     def update(
         self, innovation: Floats, sensitivity: Floats, variance: Floats, robust: float | None = None
@@ -129,9 +111,10 @@ class Lanes:
         """See `Tracks`."""
         blocks, m, d, width = self.mean.shape
         n, k, laid, chosen = self.layout.tracks, innovation.shape[1], self.layout.laid, self.modes
-        y, r, h, degrees = _cleared(innovation, variance, sensitivity)
+        y, r, h = _cleared(innovation, variance, sensitivity)
         limit = np.full((blocks, m, width), math.inf)
         if robust is not None:
+            degrees = (~np.isnan(innovation)).sum(axis=1)
             limit = laid((robust * robust * np.maximum(degrees, 1.0)).reshape(n, m))
         y, r = laid(y.reshape(n, m, k)), laid(r.reshape(n, m, k))
         h = laid(h.reshape(n, m, k, SIZE)) if len(h) > 1 else self.layout.once(h[:, None])
@@ -174,17 +157,29 @@ class Lanes:
         return Estimate(mean, covariance)
 
 
+def _of_modes(chosen: Modes) -> tuple[tuple[Floats, Floats, Floats, Floats, Floats], Bools, tuple[Ints, Ints], Floats]:
+    """What `mixed_and_moved` is told of the modes and of their set."""
+    numbers, held, m = chosen.numbers, chosen.acceleration, chosen.count
+    along, across, holds = np.ones(m), np.zeros(m), np.zeros(m, dtype=np.bool_)
+    along[numbers.uneven], across[numbers.uneven] = numbers.along, numbers.across
+    holds[list(numbers.holds)] = True
+    lasting = (0.0, 0.0) if held is None else (held.along_mps2, held.across_mps2)
+    banked = STANDARD_GRAVITY_MPS2 * math.tan(chosen.bank_rad)
+    set_of = np.array([banked, chosen.turn_rate_rps, *lasting, MANOEUVRE_SHARE])
+    floats = (numbers.turn, numbers.shaken.fades, numbers.shaken.scale, along, across)
+    return floats, holds, (SHAPE, POWER), set_of
+
+
 def _lower(matrices: Floats) -> Floats:
     """The lower triangles (..., t) of matrices (..., d, d)."""
     below = np.tril_indices(matrices.shape[-1])
     return np.asarray(matrices[..., below[0], below[1]])
 
 
-def _cleared(innovation: Floats, variance: Floats, sensitivity: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """What was not measured, NaN in innovations (n m, k), has innovation 0, variance 1 and tells nothing; and how many were."""
+def _cleared(innovation: Floats, variance: Floats, sensitivity: Floats) -> tuple[Floats, Floats, Floats]:
+    """What was not measured, NaN in innovations (n m, k), has innovation 0, variance 1, and tells nothing."""
     missing, h = np.isnan(innovation), sensitivity[:, :, :SIZE]
-    degrees = (~missing).sum(axis=1).astype(np.float64)
     if not missing.any():
-        return innovation, variance, h, degrees
+        return innovation, variance, h
     kept = np.where(missing[:, :, None], 0.0, h)
-    return np.where(missing, 0.0, innovation), np.where(missing, 1.0, variance), kept, degrees
+    return np.where(missing, 0.0, innovation), np.where(missing, 1.0, variance), kept

@@ -29,15 +29,12 @@ class Layout:
 
     def laid(self, array: Floats) -> Floats:
         """An array (n, ...) as (b, ..., width); one row is that of every track."""
-        return np.ascontiguousarray(self.viewed(array))
-
-    def viewed(self, array: Floats) -> Floats:
-        """The same where it need not be contiguous: a view, or to be copied to its place."""
         if len(array) == 1:
-            return np.broadcast_to(array[0, ..., None], (self.blocks, *array.shape[1:], self.width))
+            shape = (self.blocks, *array.shape[1:], self.width)
+            return np.ascontiguousarray(np.broadcast_to(array[0, ..., None], shape))
         if len(array) < self.blocks * self.width:
             array = array[np.minimum(np.arange(self.blocks * self.width), len(array) - 1)]
-        return np.moveaxis(array.reshape(self.blocks, self.width, *array.shape[1:]), 1, -1)
+        return np.ascontiguousarray(np.moveaxis(array.reshape(self.blocks, self.width, *array.shape[1:]), 1, -1))
 
     def once(self, array: Floats) -> Floats:
         """An array (1, ...) that is every track's as one block (1, ..., width)."""

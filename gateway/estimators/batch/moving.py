@@ -4,15 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
-from gateway.estimators.batch.packed import Bools, Floats, at, compiled
-
-# of `turning.entries`: where each stands
-ALONG, ACROSS, BACK, TIME, COSINE, SINE, RIGHT, KEEP = range(2, 10)
-PLACE, BOTH, SPEED, ASIDE, OTHER, HEIGHT, CLIMBING, CLIMB, ERROR = range(10, 19)
-SHIFT, PUSH, LEFT = range(
-    19, 22
-)  # what an acceleration that lasts adds to position and velocity, and what is left of it
-ENTRIES = 22
+from gateway.estimators.batch.entering import ENTRIES, LEFT, PUSH, SHIFT, entered, flown, turned, usual
+from gateway.estimators.batch.packed import Bools, Floats, Ints, at, compiled
+from gateway.estimators.turning import (
+    ACROSS,
+    ALONG,
+    ASIDE,
+    BACK,
+    BOTH,
+    CLIMB,
+    CLIMBING,
+    COSINE,
+    ERROR,
+    HEIGHT,
+    KEEP,
+    OTHER,
+    PLACE,
+    RIGHT,
+    SINE,
+    SPEED,
+    TIME,
+)
 
 
 @compiled
@@ -23,20 +35,28 @@ def mixed_and_moved(
     error: Floats,
     chance: Floats,
     anew: bool,
-    entries: Floats,
-    way: Floats,
-    usual: Floats,
+    elapsed_s: Floats,
+    response: Floats,
     grown: Floats,
+    turn: Floats,
+    fades: Floats,
+    scale: Floats,
+    along: Floats,
+    across: Floats,
     holds: Bools,
-    share: float,
+    shape: Ints,
+    power: Ints,
+    set_of: Floats,
     mean_after: Floats,
     covariance_after: Floats,
     weight_after: Floats,
     error_after: Floats,
 ) -> None:
     """All blocks. Means (b, m, d, L), covariances (b, m, t, L), weights (b, m, L), the told error (b, t, L); the modes'
-    transition (b, m, m, L), and whether by it modes are drawn anew whatever they were; `Lanes._motion`; and which share of the
-    noise the error gets.
+    transition (b, m, m, L), and whether by it modes are drawn anew whatever they were; times (b, L), and over these what becomes
+    of an acceleration that lasts, (b, 3, L) and (b, 6, L). Of the modes: `mode_set.Numbers` (m, ...), `across` 0 where noise is
+    alike. Of the set: g times the tangent of the bank, the least turn rate, the lasting acceleration along and across, and
+    which share of the noise the error gets.
     """
     lanes = mean.shape[-1]
     blocks, m, d, _ = mean.shape
@@ -45,11 +65,16 @@ def mixed_and_moved(
     shares, middle = np.empty((m, lanes)), np.empty((d, lanes))
     mixed, half = np.empty((t, lanes)), np.empty((d, d, lanes))
     noise, noises, whole = np.empty((t, lanes)), np.empty((t, lanes)), np.empty((ENTRIES, lanes))
+    speed, course, entries = np.empty(lanes), np.empty((2, lanes)), np.zeros((ENTRIES, lanes))
+    way, drawn = np.empty((3, lanes)), np.empty((3, lanes))
+    banked, least_rps, along_mps2, across_mps2, share = set_of
     for b in range(blocks):
         _apart(mean[b], covariance[b], off, spread)
         if anew:
             _summed(weight[b], off, off[m])
             _summed(weight[b], spread, spread[m])
+        flown(weight[b], mean[b], speed, course)
+        usual(course, along_mps2, across_mps2, drawn)
         whole[:] = 0.0
         noises[:] = 0.0
         for j in range(m):
@@ -63,15 +88,20 @@ def mixed_and_moved(
             for i in range(d):
                 for lane in range(lanes):
                     middle[i, lane] += mean[b, 0, i, lane]
-            _moved_mean(middle, entries[b, j], mean_after[b, j])
-            _noise(entries[b, j], way[b, j], usual[b], grown[b], holds[j], noise, d)
-            _moved(mixed, entries[b, j], noise, half, covariance_after[b, j], d)
+            entered(elapsed_s[b], speed, turn[j], banked, least_rps, fades[j], scale[j], shape, power, entries)
+            for p in range(3):
+                for lane in range(lanes):
+                    entries[SHIFT + p, lane] = response[b, p, lane] if holds[j] else 0.0
+            turned(course, speed, along[j], across[j], least_rps, way)
+            _moved_mean(middle, entries, mean_after[b, j])
+            _noise(entries, way, drawn, grown[b], holds[j], noise, d)
+            _moved(mixed, entries, noise, half, covariance_after[b, j], d)
             for p in range(t):
                 for lane in range(lanes):
                     noises[p, lane] += weight_after[b, j, lane] * noise[p, lane]
             for p in range(ENTRIES):
                 for lane in range(lanes):
-                    whole[p, lane] += weight_after[b, j, lane] * entries[b, j, p, lane]
+                    whole[p, lane] += weight_after[b, j, lane] * entries[p, lane]
         for i in range(d):
             for c in range(i + 1):
                 if c < 6 or i > 8:  # of the source's error all of the noise
@@ -245,7 +275,7 @@ def _moved(p: Floats, e: Floats, noise: Floats, half: Floats, after: Floats, d: 
 
 
 @compiled
-def _noise(e: Floats, way: Floats, usual: Floats, grown: Floats, holds: bool, noise: Floats, d: int) -> None:
+def _noise(e: Floats, way: Floats, drawn: Floats, grown: Floats, holds: bool, noise: Floats, d: int) -> None:
     """The noise (t, L) of a mode: level (times its way), upright, of the source's error, and of the acceleration that lasts."""
     lanes = e.shape[-1]
     noise[:] = 0.0
@@ -272,9 +302,9 @@ def _noise(e: Floats, way: Floats, usual: Floats, grown: Floats, holds: bool, no
         return
     if not holds:
         for lane in range(lanes):
-            noise[at(9, 9), lane] = usual[0, lane]
-            noise[at(10, 9), lane] = usual[1, lane]
-            noise[at(10, 10), lane] = usual[2, lane]
+            noise[at(9, 9), lane] = drawn[0, lane]
+            noise[at(10, 9), lane] = drawn[1, lane]
+            noise[at(10, 10), lane] = drawn[2, lane]
         return
     level = (0, 3, 9)
     for p in range(3):
@@ -282,9 +312,9 @@ def _noise(e: Floats, way: Floats, usual: Floats, grown: Floats, holds: bool, no
             r, c = level[p], level[q]
             for lane in range(lanes):
                 of_both = grown[at(p, q), lane]
-                noise[at(r, c), lane] += of_both * usual[0, lane]
-                noise[at(r + 1, c), lane] += of_both * usual[1, lane]
-                noise[at(r + 1, c + 1), lane] += of_both * usual[2, lane]
+                noise[at(r, c), lane] += of_both * drawn[0, lane]
+                noise[at(r + 1, c), lane] += of_both * drawn[1, lane]
+                noise[at(r + 1, c + 1), lane] += of_both * drawn[2, lane]
             if p > q:
                 for lane in range(lanes):
-                    noise[at(r, c + 1), lane] += grown[at(p, q), lane] * usual[1, lane]
+                    noise[at(r, c + 1), lane] += grown[at(p, q), lane] * drawn[1, lane]

@@ -27,9 +27,9 @@ def together(
     the modes' disagreement as it counts `by` (b, m, L).
     """
     lanes = mean.shape[-1]
-    blocks, m, d, _ = mean.shape
-    n, t = len(mean_told), covariance.shape[2]
-    middle, off, p = np.empty((d, lanes)), np.empty((m, d, lanes)), np.empty((t, lanes))
+    blocks, m, _, _ = mean.shape
+    n, d = len(mean_told), TOLD
+    middle, off, p = np.empty((d, lanes)), np.empty((m, d, lanes)), np.empty((d * (d + 1) // 2, lanes))
     behind = np.empty((2, d, lanes))
     for b in range(blocks):
         for i in range(d):
@@ -61,7 +61,7 @@ def together(
                             p[at(i, c), lane] += behind[part, i, lane] * behind[part, c, lane]
         for lane in range(min(lanes, n - b * lanes)):
             row = b * lanes + lane
-            for i in range(TOLD):
+            for i in range(d):
                 mean_told[row, i] = middle[i, lane]
-                for c in range(TOLD):
+                for c in range(d):
                     covariance_told[row, i, c] = p[at(i, c), lane]
