@@ -6,7 +6,6 @@ Without numba the loops are run as they stand, number by number; with it, as mac
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,12 +31,11 @@ WHOLE[0, :3, 6:] = np.eye(3)  # position with the source's error, and velocity
 
 
 @pytest.fixture(autouse=True)
-def narrow(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def narrow(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two blocks of two tracks, the last one filled up."""
     monkeypatch.setattr(layout, "STEP", 1)
     monkeypatch.setattr(layout, "WIDEST", 2)
     assert Layout.of(N) == Layout(N, 2, 2)
-    yield
 
 
 def gateways(estimator: str = "rmimm") -> Modes:
@@ -55,12 +53,12 @@ class Both:
     lanes: tracks.Tracks
 
     @classmethod
-    def begin(cls, modes: Modes, sigma_m: float = 20.0) -> Both:
+    def begin(cls, modes: Modes, far_m: float = 3e4) -> Both:
         """Three aircraft of 15 to 130 m/s, and one that stands."""
         random = np.random.default_rng(5)
         velocity = np.array([[15.0, 3.0, 0.5], [-90.0, 93.0, -3.0], [0.0, 0.0, 0.0]])
-        spread = np.tile(sigma_m**2 * np.eye(3), (N, 1, 1))
-        first = start(random.normal(0.0, 3e4, (N, 3)), spread, velocity, np.full(N, 4.0), 20.0)
+        spread = np.tile(400.0 * np.eye(3), (N, 1, 1))
+        first = start(random.normal(0.0, far_m, (N, 3)), spread, velocity, np.full(N, 4.0), 20.0)
         return cls(Stacked.begin(first, modes), Lanes.begin(first, modes))
 
     def step(
@@ -125,13 +123,30 @@ def test_the_paper_s_three_modes_measured_by_each_mode_s_own_derivative() -> Non
     both.step(np.ones(N), offs(5, 3), own, 100.0)
 
 
-def test_what_lies_too_far_out_pulls_no_more_and_a_sure_measurement_keeps_its_digits() -> None:
-    """One outlier among three tracks; then one that is a million times as sure as the prediction."""
+def test_what_lies_too_far_out_pulls_no_more() -> None:
+    """One outlier among three tracks."""
     both = Both.begin(gateways())
     off = offs(6)
     off[1, 0] = 900.0
     both.step(np.ones(N), off, WHOLE, 25.0, robust=3.0)
-    both.step(np.ones(N), offs(7, size=1e-2), WHOLE, 1e-5)
+
+
+def test_a_sure_measurement_keeps_its_digits() -> None:
+    """Ten orders of magnitude surer than the prediction; of a source without an error, whose position it is then."""
+    both = Both.begin(rmimm.modes("imm"), far_m=1.0)  # a tenth of a millimetre is rounding far away
+    both.step(np.ones(N), offs(7, size=1e-4), np.eye(6, 9)[None], 1e-8)
+    assert np.sqrt(both.lanes.stated().covariance[:, 0, 0]) == pytest.approx(1e-4, rel=1e-3)
+
+
+def test_an_error_that_is_told_far_too_large_is_taken_from_the_filter() -> None:
+    """Ten times what it reckons with, before an update of one component."""
+    both = Both.begin(gateways())
+    assert isinstance(both.stacked, Stacked)
+    assert isinstance(both.lanes, Lanes)
+    mixture = both.stacked.mixture
+    both.stacked = replace(both.stacked, mixture=replace(mixture, error=10.0 * mixture.error))
+    both.lanes = replace(both.lanes, error=10.0 * both.lanes.error)
+    both.step(np.ones(N), offs(9, 1), WHOLE[:, 2:3], 25.0)
 
 
 def test_tracks_that_lag_behind_say_so() -> None:
