@@ -18,7 +18,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.decode import Decoder
 from adapters.mission_writing import TAKE_OFF, WAYPOINT, MissionItem
 from gateway.estimators.inertial import displaced, from_angles
 from gateway.observation import GpsReport, Heard, ImuSample, Many, Timing, VehicleStatus
@@ -29,10 +28,10 @@ from gateway.reckon.running import run
 from gateway.reckon.tip import Tip
 from gateway.reckon.told import ATTITUDE, PLACE, WIDTHS, Series, Told, portioned
 from gateway.reckon.vehicle import first_tip
-from gateway.runtime.playback import open_playback
 from gateway.settings import DeadReckoning
 from sim.flown_way import Craft, FlownWay
 from sim.studies.real_flight import Windows, scored
+from sim.studies.walked import recorded
 from sim.told_rides import AUTOPILOT_RAD, LASTS_S, NOISE_M, NOISE_MPS, WANDERS_FOR_S, WANDERS_M, lasting
 from sim.vehicles.motion import Home
 from sim.vehicles.steering import Plane
@@ -196,11 +195,7 @@ def main() -> None:
                 print(f"  {pooled([windows(*one[:2], length_s, truth=one[2]) for one in several]).sentence()}")
         return
     path, *names = sys.argv[1:]
-    playback = open_playback([Path(path)])
-    told, vehicle_type = told_of(
-        (one for _, one in Decoder(playback.sources).hear_many(list(playback.arrivals()))[0]),
-        names[0] if names else "mavlink:1",
-    )
+    told, vehicle_type = told_of(recorded(Path(path)), names[0] if names else "mavlink:1")
     print(f"carried on by {carried_by(told, vehicle_type).words}")
     for length_s in (20.0, 60.0):
         print(f"  {windows(told, vehicle_type, length_s).sentence()}")
