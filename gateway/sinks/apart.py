@@ -12,8 +12,10 @@ import os
 import pickle
 import subprocess
 import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
@@ -27,7 +29,7 @@ from gateway.sinks.serving import free_port
 
 SIZE_BYTES = 8
 _GATHERED_NS = 100_000_000  # of session time: a message costs the same for one picture as for ten
-_GATHERED_AT_MOST = 16  # pictures; more in one message would hold the interpreter for long
+_GATHERED_AT_MOST = 16_000_000  # bytes that wait while the process draws: a crowd's ten seconds; then it is waited for
 _HEALTH_NS = 1_000_000_000  # as often as it is drawn
 _ATTITUDE_NS = 20_000_000  # of one aircraft: a symbol that turns 50 times a second turns smoothly
 _DRAWN = GpsReport | RadarPlot | FlightPlan | Intent | WeatherArea
@@ -50,6 +52,11 @@ class Gathered:
         self.count += 1
 
     @property
+    def size(self) -> int:
+        """Bytes."""
+        return self._content.tell()
+
+    @property
     def content(self) -> bytes:
         """As `pictures` reads it."""
         return self._content.getvalue()
@@ -64,9 +71,10 @@ def pictures(count: int, content: bytes) -> list[Picture]:
 class Apart:
     """Draws pictures in another process: see `gateway.sinks.rerun.RerunSink`, whose arguments these are.
 
-    Nothing is dropped: a message is sent when the one before has been taken. `write` and `close` raise OSError when the
-    file could not be written, or the process has ended by itself. Raises OSError if it cannot be started, or the port is
-    taken.
+    Nothing is dropped: a message is sent when the one before has been taken, and until then pictures are gathered. A crowd
+    takes seconds to draw: whoever waited for that would have all their pictures to pickle at once, and hold up the next ones.
+    `write` and `close` raise OSError when the file could not be written, or the process has ended by itself. Raises OSError if
+    it cannot be started, or the port is taken.
     """
 
     def __init__(self, site: Site, *, path: Path | None, serve: tuple[str, int] | None, **arguments: Any) -> None:
@@ -78,6 +86,7 @@ class Apart:
         self._health_at: int | None = None
         self._attitude_at: dict[str, int] = {}
         self._unanswered = 0
+        self._answers: SimpleQueue[bytes] = SimpleQueue()
         self._is_open = True
         self.address: str | None = None  # what a viewer opens, once it can
         self.dropped = 0  # rows that viewers did not take in time; the file has them
@@ -88,6 +97,7 @@ class Apart:
             stdout=subprocess.PIPE,
             env={**os.environ, "PYTHONPATH": search},
         )
+        threading.Thread(target=self._listen, name="answers of the process that draws", daemon=True).start()
         self._tell("open", site, {"path": path, "serve": serve, **arguments})
 
     @property
@@ -101,12 +111,13 @@ class Apart:
         if self._since is None:
             self._since = picture.now
         waited = picture.now - self._since
-        if not 0 <= waited < _GATHERED_NS or self._gathered.count >= _GATHERED_AT_MOST:
+        is_busy = self._unanswered > 0 and self._answers.empty()
+        if self._gathered.size >= _GATHERED_AT_MOST or not (0 <= waited < _GATHERED_NS or is_busy):
             self._hand_over()
             self._since = picture.now
 
     def flush(self, now: int) -> None:
-        """Nothing by itself: what is gathered goes with the next picture, a tenth of a second later at most."""
+        """Nothing by itself: what is gathered goes with a picture a tenth of a second later, once the last ones are drawn."""
 
     def write_smoothed(self, fused: Fused, step: NDArray[np.int64]) -> None:
         """Draw smoothed rows of one track in the order of time, and the numbers of their pictures; raises OSError."""
@@ -172,12 +183,22 @@ class Apart:
             self._unexpected_end()
         self._unanswered += 1
 
+    def _listen(self) -> None:
+        """Take the process's answers as they come, b"" being its end; in a thread, so that others can see if there is one."""
+        assert self._child.stdout is not None
+        with self._child.stdout as answers:
+            while True:
+                size = int.from_bytes(answers.read(SIZE_BYTES), "little")
+                answer = answers.read(size)
+                if not size or len(answer) < size:
+                    break
+                self._answers.put(answer)
+        self._answers.put(b"")
+
     def _hear(self) -> None:
         """What became of what was asked."""
-        assert self._child.stdout is not None
-        size = int.from_bytes(self._child.stdout.read(SIZE_BYTES), "little")
-        answer = self._child.stdout.read(size)
-        if not size or len(answer) < size:
+        answer = self._answers.get()
+        if not answer:
             self._unexpected_end()
         self._unanswered -= 1
         self.address, self.dropped, refused = pickle.loads(answer)
@@ -195,8 +216,6 @@ class Apart:
         """Let the process end; it does when nobody tells it anything any more."""
         self._is_open = False
         assert self._child.stdin is not None
-        assert self._child.stdout is not None
         with contextlib.suppress(BrokenPipeError):
             self._child.stdin.close()
         self._child.wait()
-        self._child.stdout.close()

@@ -48,7 +48,13 @@ def without_row_ids(entities: dict) -> dict:
     return {path: rows for path, rows in bare.items() if not path.startswith("/__properties")}
 
 
-def test_the_same_is_drawn_as_here_whatever_the_terminal_tells_everybody(tmp_path, pictures, read):
+@pytest.fixture
+def waited_for(monkeypatch):
+    """Nothing is gathered while the process draws: each picture waits until those before are drawn."""
+    monkeypatch.setattr(apart_module, "_GATHERED_AT_MOST", 1)
+
+
+def test_the_same_is_drawn_as_here_whatever_the_terminal_tells_everybody(tmp_path, pictures, read, waited_for):
     """Whatever is not carried over is not drawn either. Ctrl-C reaches every process; who started this one ends it."""
     made = pictures(20.0, end=True)
     here = RerunSink(DEMO_SITE, path=tmp_path / "here.rrd", modes=True)
@@ -73,6 +79,18 @@ def test_the_same_is_drawn_as_here_whatever_the_terminal_tells_everybody(tmp_pat
     drawn = {name: without_row_ids(read(tmp_path / f"{name}.rrd")) for name in ("here", "apart")}
     assert drawn["apart"].keys() == drawn["here"].keys()
     assert repr(drawn["apart"]) == repr(drawn["here"])  # as text, where what is not known equals itself
+
+
+def test_while_the_process_draws_pictures_gather_and_nobody_waits(tmp_path, pictures, read):
+    """A process that is stopped takes nothing; everything is drawn once it goes on."""
+    path, made = tmp_path / "session.rrd", pictures(20.0)
+    sink = Apart(DEMO_SITE, path=path, serve=None)
+    os.kill(sink.process, signal.SIGSTOP)
+    write_all(sink, made)
+    assert sink._gathered.count == len(made)  # nothing has been answered yet, not even that it is open
+    os.kill(sink.process, signal.SIGCONT)
+    sink.close()
+    assert made[-1].now - max(row["utc"] for row in read(path)["/fuse/1"] if row.get("utc")) < 2_000_000_000
 
 
 def test_of_attitudes_that_come_thick_fifty_a_second_of_each_aircraft_are_carried_over(pictures, monkeypatch):
@@ -113,7 +131,7 @@ def test_a_port_that_is_taken_raises_at_once():
             Apart(DEMO_SITE, path=None, serve=("127.0.0.1", port))
 
 
-def test_a_disk_that_takes_no_more_is_said_once(tmp_path, pictures, small_disk):
+def test_a_disk_that_takes_no_more_is_said_once(tmp_path, pictures, small_disk, waited_for):
     sink = Apart(DEMO_SITE, path=tmp_path / "session.rrd", serve=None)
     with pytest.raises(OSError, match=r"recording could not be written.*session\.rrd"):
         write_all(sink, pictures(60.0))
@@ -131,7 +149,7 @@ def test_a_process_that_is_killed_is_said(tmp_path, pictures):
     sink.close()
 
 
-def test_when_the_gateway_is_killed_everything_that_was_handed_over_is_drawn(tmp_path, pictures, read):
+def test_when_the_gateway_is_killed_everything_that_was_handed_over_is_drawn(tmp_path, pictures, read, waited_for):
     """What is left of the gateway then is the end of the pipe; the file can be read without an index."""
     path: Path = tmp_path / "session.rrd"
     sink = Apart(DEMO_SITE, path=path, serve=None, period_s=3600.0)
