@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import json as text
 import math
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,7 +21,8 @@ _LONGEST = 1000  # characters of a table's line
 
 _HELP = """
 Run a paper's experiment and show its table; the figures of most go into an .rrd for the viewer (conflicts, live-registration,
-noise, sigmas and tuning only show tables). With their usual --runs many take minutes; fewer runs are quicker.
+noise, sigmas and tuning only show tables). With their usual --runs many take minutes; fewer runs are quicker. Where numba is
+installed (pip install 'talkdown[fast]') rmimm, consistency and tuning follow their draws with a compiled filter.
 
 Example:
 
@@ -55,6 +57,9 @@ def study(
 
     module = importlib.import_module(f"sim.studies.{name.replace('-', '_')}")
     console = Console(stderr=True)
+    batches = sys.modules.get("gateway.estimators.batch.tracks")  # of the studies that follow many draws in step
+    if batches is not None and not batches.is_prepared() and not quiet:
+        console.print("The filter is compiled first, once after an installation: half a minute or more.")
     with Progress(console=console, transient=True, disable=quiet or not console.is_terminal) as progress:
         task = progress.add_task(name, total=1.0)
         found: Study = module.run(

@@ -168,6 +168,7 @@ def test_one_mode_is_a_kalman_filter() -> None:
     both = Both.begin(one)
     both.step(np.ones(N), offs(8), WHOLE, 25.0)
     assert both.lanes.weights == pytest.approx(1.0)
+    assert tracks.is_prepared()  # whatever had to be compiled has been, and is kept
 
 
 def test_literal_is_never_compiled_the_others_are_where_numba_is() -> None:

@@ -46,6 +46,15 @@ def compiled(function: Function) -> Function:
     return made
 
 
+def is_kept(function: object) -> bool:
+    """Whether machine code of a function is kept from an earlier start; without numba there is none to be made."""
+    stats = getattr(function, "stats", None)
+    if stats is None:
+        return True
+    name = getattr(function, "__qualname__", "")
+    return any(Path(stats.cache_path).glob(f"*{name}*.nbi"))
+
+
 @compiled
 def at(i: int, j: int) -> int:
     """Where entry (i, j) of a symmetric matrix stands."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.estimators.batch import packed
+from gateway.estimators.batch.judging import judged
 from gateway.estimators.batch.lanes import Lanes
 from gateway.estimators.batch.stacked import Stacked
 from gateway.estimators.kalman import Estimate
@@ -52,3 +53,8 @@ class Tracks(Protocol):
 def begin(state: Estimate, chosen: Modes) -> Tracks:
     """n tracks that were just started, n > 0: compiled where numba is installed; `literal` never is."""
     return Lanes.begin(state, chosen) if packed.INSTALLED and chosen.rule != "literal" else Stacked.begin(state, chosen)
+
+
+def is_prepared() -> bool:
+    """Whether a batch begins at once: the compiler's half a minute, once after each installation, is over or not needed."""
+    return packed.is_kept(judged)
