@@ -15,6 +15,7 @@ import typer
 from gateway.cli import options as take
 from gateway.cli.failures import UsageError
 from gateway.cli.many import wide_console
+from gateway.cli.progress import progressing
 from sim.studies import STUDIES, Study
 
 _LONGEST = 1000  # characters of a table's line
@@ -49,24 +50,19 @@ def study(
     json: take.JsonOption = False,
 ) -> None:
     """Run a paper's experiment."""
-    from rich.console import Console
-    from rich.progress import Progress
-
     if name not in STUDIES:
         raise UsageError(f"There is no study {name!r}; there are: {', '.join(STUDIES)}.")
 
     module = importlib.import_module(f"sim.studies.{name.replace('-', '_')}")
-    console = Console(stderr=True)
     batches = sys.modules.get("gateway.estimators.batch.tracks")  # of the studies that follow many draws in step
     if batches is not None and not batches.is_prepared() and not quiet:
-        console.print("The filter is compiled first, once after an installation: half a minute or more.")
-    with Progress(console=console, transient=True, disable=quiet or not console.is_terminal) as progress:
-        task = progress.add_task(name, total=1.0)
+        typer.echo("The filter is compiled first, once after an installation: half a minute or more.", err=True)
+    with progressing(name, show=not quiet) as tell:
         found: Study = module.run(
             runs,
             seed,
             rrd=rrd or Path(f"{name}.rrd"),
-            progress=lambda what, share: progress.update(task, description=what, completed=share),
+            progress=lambda what, share: tell(share, what),
         )
     if json:
         print(text.dumps(_plain(asdict(found))))
