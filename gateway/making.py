@@ -96,8 +96,8 @@ class Making:
         return [replace(row, wind_mps=self.reckoners.wind_mps(row.aircraft)) for row in rows]
 
     def _scene(self) -> Scene:
-        doubted = self.consistency.contradicted | self.reckoners.doubted
-        return Scene(self.tracks, self._spans, self.options, self.predicting.headings, doubted)
+        contradicted, doubted = self.consistency.contradicted, self.reckoners.doubted
+        return Scene(self.tracks, self._spans, self.options, self.predicting.headings, contradicted, doubted)
 
     @property
     def _spans(self) -> Spans:

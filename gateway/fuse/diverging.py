@@ -6,6 +6,9 @@ same, but slowly, and at a speed that nothing flies. A state that is no number, 
 
 What is lost again soon after may have been begun with a velocity that is not that of the positions (another sign, another
 unit, or none where the aircraft flies). Then velocities of its reports are left out until they fit what their positions say.
+
+What took in velocities that are known to be wrong by now is sure of a wrong speed, and follows positions too slowly to be
+lost: it begins anew without them.
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ from numpy.typing import NDArray
 
 from gateway.align import SECOND, Fix
 from gateway.estimators.kalman import Estimate
-from gateway.fuse.events import Event, Measure
+from gateway.fuse.events import Doubt, Event, Measure
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +33,8 @@ MANOEUVRE_MPS2, NEAR_M = 10.0, 30.0
 AGAIN_S, AGAIN_INTERVALS = 10.0, 8  # lost again within so long, or so many intervals between measurements
 DOUBTS = 10  # velocities in a row that must fit before they are believed again
 KNOWN_MPS, FITS_SIGMA = 10.0, 3.0  # a velocity that is not known so well fits anything
+
+MISLED = "velocities that are not those of its positions led it"
 
 _MOVING, _SPEEDS = np.arange(6), np.arange(3, 6)
 
@@ -65,6 +70,11 @@ def why(event: Event, first: Estimate) -> str | None:
 def lost_again(event: Event) -> bool:
     """Whether a filter that is lost began anew only lately."""
     return event.at - event.restarted_at <= max(int(AGAIN_S * SECOND), AGAIN_INTERVALS * event.interval)
+
+
+def is_misled(base: Event, doubt: Doubt) -> bool:
+    """Whether a track's state comes of velocities that are known to be wrong: it never began without them."""
+    return doubt is Doubt.ALL_ALONG and not base.doubts
 
 
 def believed(base: Event, measure: Measure) -> Measure:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,14 @@ Neighbour = Callable[[Fix], Near | None]  # what a track's radar measured at a r
 Belief = Mixture | Floats | None  # what an estimator keeps of a track beside mean and covariance, of one track
 
 NEVER = -(1 << 62)
+
+
+class Doubt(IntEnum):
+    """Whether velocities of an aircraft's reports are known not to be those of its positions."""
+
+    NONE = 0
+    LATELY = 1  # they turned wrong, and none of them was worked in: they are left out
+    ALL_ALONG = 2  # and what they told the track before is dropped
 
 
 @made_swiftly
@@ -100,7 +109,7 @@ class Job:
     neighbour: Neighbour
     fresh: int = -1  # serial of the measurement that asked for it
     headings: tuple[Heading, ...] = ()  # where its aircraft says it goes
-    doubted: bool = False  # velocities of its reports are known not to be those of their positions
+    doubt: Doubt = Doubt.NONE
 
 
 def rank(measure: Measure) -> tuple[int, int, str, int]:

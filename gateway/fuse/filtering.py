@@ -13,10 +13,12 @@ from gateway.estimators.kalman import Estimate
 from gateway.fuse.agreement import score_after
 from gateway.fuse.diverging import (
     DOUBTS,
+    MISLED,
     believed,
     can_begin,
     doubts_after,
     far_row,
+    is_misled,
     is_sound,
     lost_again,
     may_be_lost,
@@ -24,7 +26,7 @@ from gateway.fuse.diverging import (
     without_velocity,
 )
 from gateway.fuse.estimating import Estimator, Group, InteractingModels, SingleModel, stacked
-from gateway.fuse.events import NEVER, Belief, Event, Job, Measure, Near, Neighbour, Residual, rank
+from gateway.fuse.events import NEVER, Belief, Doubt, Event, Job, Measure, Near, Neighbour, Residual, rank
 from gateway.fuse.headings import Point, goal_at
 from gateway.fuse.light import LightFilter
 from gateway.fuse.resuming import resumed
@@ -48,8 +50,8 @@ def run(jobs: Sequence[Job], model: Model) -> list[list[Event]]:
         goals = None
         if heads:
             goals = [goal_at(jobs[index].headings, measure.at) for index, measure in zip(active, measures, strict=True)]
-        doubted = [jobs[index].doubted for index in active]
-        advanced = _advance(bases, measures, neighbours, goals, doubted, estimator, model)
+        doubts = [jobs[index].doubt for index in active]
+        advanced = _advance(bases, measures, neighbours, goals, doubts, estimator, model)
         for index, event in zip(active, advanced, strict=True):
             events[index].append(event)
     return events
@@ -77,28 +79,28 @@ def _advance(
     measures: Sequence[Measure],
     neighbours: Sequence[Neighbour],
     goals: Sequence[Point] | None,
-    doubted: Sequence[bool],
+    doubts: Sequence[Doubt],
     estimator: Estimator,
     model: Model,
 ) -> list[Event]:
     """One measurement for each of some tracks: those with one formula and one radar are worked in together."""
     literal = model.weighting == "literal"
     events: dict[int, Event] = {}
-    groups: dict[tuple[str, int], list[tuple[int, Event, Measure, Measure, Near | None]]] = {}
-    for row, (base, measure) in enumerate(zip(bases, measures, strict=True)):
+    groups: dict[tuple[str, int], list[tuple[int, Event, Measure, Measure, Near | None, bool]]] = {}
+    for row, (base, measure, doubt) in enumerate(zip(bases, measures, doubts, strict=True)):
         if isinstance(measure, ReckonedFix):
             events[row] = resumed(base, measure, estimator, model)
             continue
-        if base is None:
-            first, belief = estimator.begin(without_velocity(measure) if doubted[row] else measure)
-            nothing = np.full((model.memory, 3), np.nan)
-            events[row] = _event(measure, first.mean[0], first.covariance[0], nothing, belief, None)
+        misled = base is not None and is_misled(base, doubt)
+        if base is None or (misled and isinstance(measure, Fix)):
+            events[row] = _begun(base, measure, doubt, estimator, model)
             continue
         near = neighbours[row](measure) if literal and isinstance(measure, Fix) and measure.has_height else None
-        taken = without_velocity(measure) if doubted[row] else believed(base, measure)
-        groups.setdefault(_group(measure, near), []).append((row, base, measure, taken, near))
+        doubted = bool(doubt) and not misled  # a plot leaves it to the next report to begin anew
+        taken = without_velocity(measure) if doubted else believed(base, measure)
+        groups.setdefault(_group(measure, near), []).append((row, base, measure, taken, near, doubted))
     for (kind, radar), members in groups.items():
-        rows, before, chosen, given, seen = zip(*members, strict=True)
+        rows, before, chosen, given, seen, doubtful = zip(*members, strict=True)
         elapsed_s = np.array([(measure.at - base.at) / SECOND for base, measure in zip(before, chosen, strict=True)])
         memory = stacked([base.memory for base in before])
         goal = None if goals is None else np.array([goals[row] for row in rows])
@@ -108,16 +110,26 @@ def _advance(
         all_sound = is_sound(after.state)
         states = zip(after.state.mean, after.state.covariance, after.memory, after.beliefs, strict=True)
         residuals = [None] * len(before) if after.residual is None else list(zip(*after.residual, strict=True))
-        told = zip(after.outlying.tolist(), after.far.tolist(), residuals, strict=True)
-        for row, base, measure, state, (outlying, far, residual) in zip(
+        told = zip(after.outlying.tolist(), after.far.tolist(), residuals, doubtful, strict=True)
+        for row, base, measure, state, (outlying, far, residual, doubted) in zip(
             rows, before, chosen, states, told, strict=True
         ):
             far_off, far_since = far_row(base) if far else (0, NEVER)
             score = score_after(base, measure, model)
-            event = _event(measure, *state, base, outlying, score, far_off, far_since, residual, doubted[row])
+            event = _event(measure, *state, base, outlying, score, far_off, far_since, residual, doubted)
             lost = (far_off and may_be_lost(event)) or not all_sound
             events[row] = _begun_again(event, estimator) if lost else event
     return [events[row] for row in range(len(measures))]
+
+
+def _begun(base: Event | None, measure: Measure, doubt: Doubt, estimator: Estimator, model: Model) -> Event:
+    """A track from its first measurement, or, where velocities misled it, from its newest one without these."""
+    first, belief = estimator.begin(without_velocity(measure) if doubt else measure)
+    nothing = np.full((model.memory, 3), np.nan)
+    event = _event(measure, first.mean[0], first.covariance[0], nothing, belief, base, doubted=bool(doubt))
+    if base is None:
+        return event
+    return replace(_anew(event, first, belief, MISLED), restarted_at=base.restarted_at, score=base.score)
 
 
 def _begun_again(event: Event, estimator: Estimator) -> Event:
@@ -131,6 +143,12 @@ def _begun_again(event: Event, estimator: Estimator) -> Event:
     if lost_again(event):
         first, belief = estimator.begin(without_velocity(event.measure))
         reason = f"{reason}, soon after it started again before: velocities of reports are left out until they fit it"
+    after = _anew(event, first, belief, reason)
+    return replace(after, restarted_at=event.at, doubts=DOUBTS if lost_again(event) else event.doubts)
+
+
+def _anew(event: Event, first: Estimate, belief: Belief, reason: str) -> Event:
+    """An event with a first state in place of its own."""
     has_height = event.height_at == event.at
     return replace(
         event,
@@ -142,8 +160,6 @@ def _begun_again(event: Event, estimator: Estimator) -> Event:
         far_off=0,
         far_since=NEVER,
         restarted=reason,
-        restarted_at=event.at,
-        doubts=DOUBTS if lost_again(event) else event.doubts,
         residual=None,
         latest={},
     )

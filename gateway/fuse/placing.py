@@ -15,6 +15,8 @@ from dataclasses import dataclass, replace
 
 from gateway.align import SECOND, Fix, Plot, ReckonedFix, bracket
 from gateway.associate import Spans, aircraft_of, ordinal_of
+from gateway.fuse.diverging import is_misled
+from gateway.fuse.events import Doubt
 from gateway.fuse.filtering import Job, Measure, Near, Neighbour, rank
 from gateway.fuse.headings import Headings
 from gateway.fuse.lanes import Lane, Lanes, contains
@@ -35,6 +37,13 @@ class Scene:
     options: Options
     headings: Headings = Headings()
     contradicted: frozenset[str] = frozenset()  # aircraft whose velocities are not those of their positions
+    doubted: frozenset[str] = frozenset()  # and those of whom dead reckoning has found it as they turned wrong
+
+    def doubt(self, lane: Lane) -> Doubt:
+        """What is known of the velocities of this lane's reports."""
+        if lane.aircraft in self.contradicted:
+            return Doubt.ALL_ALONG
+        return Doubt.LATELY if lane.aircraft in self.doubted else Doubt.NONE
 
     def neighbour(self, lane: Lane) -> Neighbour:
         """The plot of this lane's radar track at a report's time, for the literal weighting."""
@@ -148,6 +157,13 @@ def _inserted(lanes: Lanes, lane: Lane, measure: Measure, scene: Scene) -> tuple
         )
         following = [*(event.measure for event in events[touched:place]), *following]
         place = touched
+    doubt = scene.doubt(lane)
+    is_report = isinstance(measure, Fix) and not isinstance(measure, ReckonedFix)
+    if is_report and events and is_misled(lane.last, doubt):
+        # All that is remembered is worked again without velocities: two positions tell the speed that one does not.
+        first = 0 if lane.whole else 1
+        following = _without_reckoned([*(event.measure for event in events[first:place]), *following])
+        place = min(first, place)
     job = Job(
         lane.track,
         events[place - 1] if place else None,
@@ -155,7 +171,7 @@ def _inserted(lanes: Lanes, lane: Lane, measure: Measure, scene: Scene) -> tuple
         scene.neighbour(lane),
         measure.serial,
         scene.headings.of(lane.aircraft),
-        lane.aircraft in scene.contradicted,
+        doubt,
     )
     return lanes if place == len(events) else lanes.with_lane(lane.with_events(events[:place])), job
 
@@ -163,6 +179,11 @@ def _inserted(lanes: Lanes, lane: Lane, measure: Measure, scene: Scene) -> tuple
 def _is_moot(measure: Measure, until: int) -> bool:
     """Whether dead reckoning has led the track only because something that was heard late was not there yet."""
     return isinstance(measure, ReckonedFix) and not measure.is_forced and measure.at <= until
+
+
+def _without_reckoned(measures: Sequence[Measure]) -> list[Measure]:
+    """Measurements of a track that wrong velocities misled: dead reckoning that led it learnt from them too."""
+    return [one for one in measures if not isinstance(one, ReckonedFix)]
 
 
 def _rebuilt(lanes: Lanes, lane: Lane, at: int, scene: Scene) -> tuple[Lanes, Job | None]:
@@ -179,6 +200,9 @@ def _rebuilt(lanes: Lanes, lane: Lane, at: int, scene: Scene) -> tuple[Lanes, Jo
             keep = 0
         plots = sorted([*_free_plots(lane, scene), *_plots_of(lane.name, scene)], key=rank)
         measures = [*begin(plots)] if not keep else [p for p in plots if p.at >= at]
+    headings, doubt = scene.headings.of(lane.aircraft), scene.doubt(lane)
+    if lane.events and is_misled(lane.last, doubt):
+        measures = _without_reckoned(measures)
     lane = lane.with_events(lane.events[:keep])
     lanes = lanes.with_lane(lane)
     base = lane.events[-1] if keep else None
@@ -187,8 +211,7 @@ def _rebuilt(lanes: Lanes, lane: Lane, at: int, scene: Scene) -> tuple[Lanes, Jo
     measures.sort(key=rank)
     if not measures:
         return lanes, None
-    doubted, headings = lane.aircraft in scene.contradicted, scene.headings.of(lane.aircraft)
-    return lanes, Job(lane.track, base, measures, scene.neighbour(lane), headings=headings, doubted=doubted)
+    return lanes, Job(lane.track, base, measures, scene.neighbour(lane), headings=headings, doubt=doubt)
 
 
 def _begun_from_plots(lanes: Lanes, key: Key, ordinal: int, scene: Scene) -> tuple[Lanes, Job | None]:

@@ -40,6 +40,7 @@ def resumed(base: Event | None, measure: ReckonedFix, estimator: Estimator, mode
         belief,
         restarted=REASON,
         restarted_at=base.restarted_at if base is not None else NEVER,
+        doubts=base.doubts if base is not None else 0,
         score=base.score if base is not None else 0.0,
     )
 

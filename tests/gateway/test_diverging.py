@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gateway.estimators.kalman import POSITION
-from gateway.fuse.events import Event, Job
+from gateway.fuse.events import Doubt, Event, Job
 from gateway.fuse.filtering import run
 from gateway.fuse.weighting import Model
 from gateway.settings import EstimatorName, Options, PositionSource
@@ -186,3 +186,21 @@ def test_a_filter_that_is_lost_once_in_a_while_keeps_its_velocities(world: Any) 
     events = _worked(world, jumps, "kalman")
     assert sum(event.restarted is not None for event in events) == 2
     assert not any(event.doubts for event in events)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_a_track_that_wrong_velocities_led_begins_anew_with_its_next_report(
+    world: Any, estimator: EstimatorName
+) -> None:
+    """Once, not with a plot; what turned wrong only lately was never worked in, and takes nothing from the track."""
+    course, model = world.Course(), Model.of(Options(estimator=estimator), PositionSource(), world.radars)
+    speed = 0.5 * (world.frame.enu_from_runway @ course.velocity(0.0))
+    fixes = [world.fix(course, 5.0 * k, serial=k, velocity_mps=speed) for k in range(6)]
+    before = _worked(world, fixes[:3], estimator)[-1]
+    measures = [world.plot(course, 14.0, serial=9), *fixes[3:]]
+    for doubt, begins in ((Doubt.ALL_ALONG, [3]), (Doubt.LATELY, []), (Doubt.NONE, [])):
+        (events,) = run([Job(1, before, measures, lambda fix: None, doubt=doubt)], model)
+        assert [event.measure.serial for event in events if event.restarted] == begins
+        assert [event.doubts > 0 for event in events[1:]] == [doubt != Doubt.NONE] * 3
+        assert events[1].score >= before.score
+        assert (np.abs(events[1].mean[POSITION] - fixes[3].enu_m).max() < 1.0) == bool(begins)
