@@ -3,7 +3,8 @@
 Braking goes on for minutes, and so does swinging onto a course. A mode without an acceleration lags behind either, always to
 the same side, and says nothing of it. A mode that holds one has it die away with a time constant, shaken by white noise that
 keeps its variance (Singer's model). In every other mode it is drawn anew all the time, so that who changes into the mode
-begins with what is usual. Across the course aircraft accelerate more than along it: noise may be told for both.
+begins with what is usual. Across the course aircraft accelerate more than along it: noise may be told for both. Along it,
+what a fast one may brake with is its drag, which grows with the square of speed.
 
 Arrays are over n tracks and m modes, as in `modes`. Source: 000 2.1.1; R. Singer (1970), eq 8.
 """
@@ -31,17 +32,28 @@ _BLOCK = (_LEVEL[:, None] * WIDE + _LEVEL).ravel()  # where these are in a matri
 _UNIT = np.eye(2)
 _ORDER = np.array([0, 0, 1, 1, 2, 2])  # which of the three each of these is
 _HELD = SIZE + np.array([0, 1] * 3)  # the acceleration that acts on it
+_DRAG_AT_MPS = 100.0  # the speed that drag is told for
 _POINTS, _SHARES = (0.5 * part for part in np.polynomial.legendre.leggauss(8))
 _POINTS, _SHARES = np.append(_POINTS + 0.5, 1.0), np.append(_SHARES, 0.0)  # the end counts for nothing in the integral
 
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """Accelerations that last: how large they usually are, 1 sigma, and the time constant with which they die away."""
+    """Accelerations that last: how large they usually are, 1 sigma, and the time constant with which they die away.
+
+    Along the course it is `drag_mps2` at 100 m/s, growing with the square of speed up to what is usual across it, and never
+    less than `along_mps2`.
+    """
 
     across_mps2: float
     along_mps2: float
     lasts_s: float
+    drag_mps2: float = 0.0
+
+    @property
+    def drag(self) -> float:
+        """Acceleration along the course over the square of speed, 1/m."""
+        return self.drag_mps2 / _DRAG_AT_MPS**2
 
 
 def turn_along(noise: Floats, course: Floats, share: Floats, most: Floats, uneven: Ints) -> None:
@@ -56,9 +68,11 @@ def turn_along(noise: Floats, course: Floats, share: Floats, most: Floats, uneve
         of_mode[:, _MOVING[:, None], _MOVING] = _along_both(of_mode[:, 0:4:3, 0:4:3], way)
 
 
-def add_held(carry: Floats, noise: Floats, elapsed_s: Floats, course: Floats, held: Held, holds: Sequence[int]) -> None:
+def add_held(
+    carry: Floats, noise: Floats, elapsed_s: Floats, course: Floats, speed: Floats, held: Held, holds: Sequence[int]
+) -> None:
     """Fill in what two states more do to transition and noise (n, m, 11, 11) over times (n,), of which the modes `holds` do."""
-    drawn = usual(course, held)
+    drawn = usual(course, speed, held)
     response, grown = answers(elapsed_s, held.lasts_s)
     noise[..., SIZE:, SIZE:] = drawn[:, None]
     block = _along_both(grown, drawn).reshape(-1, len(_BLOCK))
@@ -75,16 +89,17 @@ def _along_both(parts: Floats, way: Floats) -> Floats:
     return (parts[:, :, None, :, None] * way[:, None, :, None, :]).reshape(n, 2 * k, 2 * k)
 
 
-def usual(course: Floats, held: Held) -> Floats:
-    """Covariance (n, 2, 2) of an acceleration of which nothing is known, at courses (n, 2)."""
-    return held.across_mps2**2 * turned(course, np.array([held.along_mps2 / held.across_mps2]))[:, 0]
+def usual(course: Floats, speed: Floats, held: Held) -> Floats:
+    """Covariance (n, 2, 2) of an acceleration of which nothing is known, at courses (n, 2) and level speeds (n,)."""
+    along = np.maximum(np.minimum(held.drag * speed * speed, held.across_mps2), held.along_mps2)
+    return held.across_mps2**2 * turned(course, (along / held.across_mps2)[:, None])[:, 0]
 
 
 def turned(course: Floats, along: Floats, across: Floats | float = 1.0) -> Floats:
-    """Variances (n, m, 2, 2) of which sigma is a share (m,) along the course and a share (n, m) across it."""
+    """Variances (n, m, 2, 2) of which sigma is a share (m,) or (n, m) along the course and a share (n, m) across it."""
     way = course[:, None, :, None] * course[:, None, None, :]
     square = np.asarray(across * across)[..., None, None]
-    return np.asarray(square * _UNIT + ((along * along)[:, None, None] - square) * way)
+    return np.asarray(square * _UNIT + ((along * along)[..., None, None] - square) * way)
 
 
 def answers(elapsed_s: Floats, lasts_s: float) -> tuple[Floats, Floats]:

@@ -63,9 +63,10 @@ def begin(state: Estimate, modes: Modes) -> Mixture:
     mean, covariance = state.mean, state.covariance
     if modes.acceleration is not None:
         level = state.mean[:, 3:5]
+        speed = speed_of(level)
         mean, covariance = np.zeros((n, WIDE)), np.zeros((n, WIDE, WIDE))
         mean[:, :SIZE], covariance[:, :SIZE, :SIZE] = state.mean, state.covariance
-        covariance[:, SIZE:, SIZE:] = usual(course_of(level, speed_of(level)), modes.acceleration)
+        covariance[:, SIZE:, SIZE:] = usual(course_of(level, speed), speed, modes.acceleration)
     return Mixture(
         np.repeat(mean[:, None], m, axis=1),
         np.repeat(covariance[:, None], m, axis=1),
@@ -126,7 +127,7 @@ def moved(mean: Floats, weight: Floats, elapsed_s: Floats, modes: Modes) -> tupl
         slow = np.minimum(speed[:, None] * modes.turn_rate_rps / numbers.across, 1.0)
         turn_along(noise, course, numbers.along, slow, numbers.uneven)
     if held is not None:
-        add_held(carry, noise, elapsed_s, course, held, numbers.holds)
+        add_held(carry, noise, elapsed_s, course, speed, held, numbers.holds)
     return carry, noise
 
 

@@ -97,6 +97,7 @@ class Estimation:
     calm_acceleration_mps2: float = 0.15  # along the course and upright
     calm_across_acceleration_mps2: float = 3.0  # courses wander more than speeds
     lasting_acceleration_mps2: float = 0.15  # along the course: braking
+    lasting_drag_mps2: float = 0.25  # braking at 100 m/s: by the square of speed, never more than across
     lasting_across_acceleration_mps2: float = 1.0  # swinging onto a course
     lasting_for_s: float = 40.0
     manoeuvre_acceleration_mps2: float = 3.0  # straight, with changes of speed or course that are no full turn

@@ -126,6 +126,7 @@ TABLES: dict[str, Table] = {
             "calm_acceleration_mps2": ("calm_acceleration_mps2", number(1e-3, 100.0)),
             "calm_across_acceleration_mps2": ("calm_across_acceleration_mps2", number(1e-3, 100.0)),
             "lasting_acceleration_mps2": ("lasting_acceleration_mps2", number(1e-3, 100.0)),
+            "lasting_drag_mps2": ("lasting_drag_mps2", number(0.0, 100.0)),
             "lasting_across_acceleration_mps2": ("lasting_across_acceleration_mps2", number(1e-3, 100.0)),
             "lasting_for_s": ("lasting_for_s", number(0.1, 1e4)),
             "manoeuvre_acceleration_mps2": ("manoeuvre_acceleration_mps2", number(1e-3, 100.0)),

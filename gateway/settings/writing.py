@@ -71,6 +71,7 @@ _ACCELERATIONS = (
     ("calm_acceleration_mps2", "along the course and upright"),
     ("calm_across_acceleration_mps2", ""),
     ("lasting_acceleration_mps2", "along the course: braking"),
+    ("lasting_drag_mps2", "more where fast: at 100 m/s, by the square of speed"),
     ("lasting_across_acceleration_mps2", "swinging onto a course"),
     ("lasting_for_s", ""),
     ("manoeuvre_acceleration_mps2", "no full turn"),

@@ -24,6 +24,7 @@ TRIED: dict[str, tuple[float, ...]] = {
     "calm_across_acceleration_mps2": (0.3, 1.0, 3.0),
     "calm_acceleration_mps2": (0.05, 0.15, 0.5),
     "lasting_across_acceleration_mps2": (0.3, 1.0, 3.0),
+    "lasting_drag_mps2": (0.0, 0.25, 0.5),
     "manoeuvre_acceleration_mps2": (0.7, 1.5, 3.0, 6.0),
     "manoeuvre_share": (2.0, 6.0, 20.0),
 }

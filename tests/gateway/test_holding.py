@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from gateway.estimators.holding import WIDE, Held
+from gateway.estimators.holding import WIDE, Held, usual
 from gateway.estimators.kalman import Motion, start
 from gateway.estimators.modes import Mode, Modes, begin, combine, moved, predict, update
 
@@ -119,6 +119,29 @@ def test_an_aircraft_that_brakes_is_followed_without_lagging() -> None:
     assert combine(mixtures["holds"]).mean.shape == (runs, 9)
     assert mixtures["holds"].weight[:, 1].mean() > 0.6
     assert mixtures["holds"].mean[:, 1, 9].mean() == pytest.approx(-0.3, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("speed_mps", "along_mps2"), [(0.0, 0.2), (15.0, 0.2), (80.0, 0.2), (100.0, 0.3), (120.0, 0.432), (300.0, 1.0)]
+)
+def test_the_fast_brake_by_their_drag(speed_mps: float, along_mps2: float) -> None:
+    """Along the course it grows with the square of speed, from what slow aircraft have to what is usual across it."""
+    held, course = Held(1.0, 0.2, 30.0, drag_mps2=0.3), np.array([0.6, 0.8])
+    drawn = usual(course[None], np.array([speed_mps]), held)[0]
+    np.testing.assert_allclose(drawn @ course, along_mps2**2 * course, rtol=1e-12)
+    np.testing.assert_allclose(drawn @ [-0.8, 0.6], [-0.8, 0.6], rtol=1e-12)
+
+
+def test_a_move_draws_by_the_speed_of_all_modes_together() -> None:
+    """At 200 m/s what is drawn where nothing is held, and what shakes that which is held, are as wide as at that speed."""
+    fast = replace(MODES, acceleration=replace(HELD, drag_mps2=0.2))
+    mean, weight, elapsed_s = np.zeros((1, 3, WIDE)), np.array([[0.5, 0.25, 0.25]]), np.ones(1)
+    mean[0, :, 3] = 100.0, 200.0, 400.0
+    _, noise = moved(mean, weight, elapsed_s, fast)
+    assert noise[0, 0, 9, 9] == pytest.approx(0.8**2)
+    _, before = moved(mean, weight, elapsed_s, MODES)
+    assert noise[0, 1, 9, 9] / before[0, 1, 9, 9] == pytest.approx(4.0**2)
+    assert noise[0, 1, 10, 10] == before[0, 1, 10, 10]
 
 
 def test_who_stands_has_no_course() -> None:

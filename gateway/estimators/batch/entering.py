@@ -101,10 +101,14 @@ def turned(course: Floats, speed: Floats, along: float, across: float, turn_rate
 
 
 @compiled
-def usual(course: Floats, along: float, across: float, drawn: Floats) -> None:
-    """The covariance (3, L) of an acceleration of which nothing is known, along and across in m/s2. See `holding.usual`."""
-    for lane in range(course.shape[1]):
-        _lies(course, lane, along * along, across * across, drawn)
+def usual(course: Floats, speed: Floats, along: float, across: float, drag: float, drawn: Floats) -> None:
+    """The covariance (3, L) of an acceleration of which nothing is known: along and across in m/s2, drag in 1/m.
+
+    See `holding.usual`.
+    """
+    for lane in range(len(speed)):
+        most = max(min(drag * speed[lane] * speed[lane], across), along)
+        _lies(course, lane, most * most, across * across, drawn)
 
 
 @compiled

@@ -163,7 +163,7 @@ def _of_modes(chosen: Modes) -> tuple[tuple[Floats, Floats, Floats, Floats, Floa
     along, across, holds = np.ones(m), np.zeros(m), np.zeros(m, dtype=np.bool_)
     along[numbers.uneven], across[numbers.uneven] = numbers.along, numbers.across
     holds[list(numbers.holds)] = True
-    lasting = (0.0, 0.0) if held is None else (held.along_mps2, held.across_mps2)
+    lasting = (0.0, 0.0, 0.0) if held is None else (held.along_mps2, held.across_mps2, held.drag)
     banked = STANDARD_GRAVITY_MPS2 * math.tan(chosen.bank_rad)
     set_of = np.array([banked, chosen.turn_rate_rps, *lasting, MANOEUVRE_SHARE])
     floats = (numbers.turn, numbers.shaken.fades, numbers.shaken.scale, along, across)

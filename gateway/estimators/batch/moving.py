@@ -55,8 +55,8 @@ def mixed_and_moved(
     """All blocks. Means (b, m, d, L), covariances (b, m, t, L), weights (b, m, L), the told error (b, t, L); the modes'
     transition (b, m, m, L), and whether by it modes are drawn anew whatever they were; times (b, L), and over these what becomes
     of an acceleration that lasts, (b, 3, L) and (b, 6, L). Of the modes: `mode_set.Numbers` (m, ...), `across` 0 where noise is
-    alike. Of the set: g times the tangent of the bank, the least turn rate, the lasting acceleration along and across, and
-    which share of the noise the error gets.
+    alike. Of the set: g times the tangent of the bank, the least turn rate, the lasting acceleration along and across and its
+    drag, and which share of the noise the error gets.
     """
     lanes = mean.shape[-1]
     blocks, m, d, _ = mean.shape
@@ -67,14 +67,14 @@ def mixed_and_moved(
     noise, noises, whole = np.empty((t, lanes)), np.empty((t, lanes)), np.empty((ENTRIES, lanes))
     speed, course, entries = np.empty(lanes), np.empty((2, lanes)), np.zeros((ENTRIES, lanes))
     way, drawn = np.empty((3, lanes)), np.empty((3, lanes))
-    banked, least_rps, along_mps2, across_mps2, share = set_of
+    banked, least_rps, along_mps2, across_mps2, drag, share = set_of
     for b in range(blocks):
         _apart(mean[b], covariance[b], off, spread)
         if anew:
             _summed(weight[b], off, off[m])
             _summed(weight[b], spread, spread[m])
         flown(weight[b], mean[b], speed, course)
-        usual(course, along_mps2, across_mps2, drawn)
+        usual(course, speed, along_mps2, across_mps2, drag, drawn)
         whole[:] = 0.0
         noises[:] = 0.0
         for j in range(m):
