@@ -139,7 +139,7 @@ def test_a_disk_that_takes_no_more_is_said_once(tmp_path, pictures, small_disk, 
     assert 300_000 < (tmp_path / "session.rrd").stat().st_size <= 400_000
 
 
-def test_a_process_that_is_killed_is_said(tmp_path, pictures):
+def test_a_process_that_is_killed_is_said(tmp_path, pictures, waited_for):
     sink = Apart(DEMO_SITE, path=tmp_path / "session.rrd", serve=None)
     made = pictures(20.0)
     write_all(sink, made[:50])
