@@ -8,8 +8,8 @@ import numpy as np
 
 from gateway.estimators.batch.packed import Floats, at, compiled, inverted
 from gateway.estimators.lagging import USUAL
+from gateway.estimators.modes import LEAST_WEIGHT
 
-LEAST_WEIGHT = 1e-6
 _PLACE_USUAL, _SPEED_USUAL = float(USUAL[0]), float(USUAL[1])
 
 
