@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from bench.estimation import OURS
 from bench.estimation_sides import ERROR_M, PEERS, Problem, Run, compiled, gateway_modes, ours, textbook
 from gateway.estimators.batch import packed
 from gateway.estimators.kalman import Estimate
 from gateway.estimators.modes import begin, moved
 
-COMPILED = "ours, compiled"
 CALM, LEFT = 0, 3  # places of the modes that are flown
 ONE_STEPS, MANY, MANY_STEPS = 300, 1000, 3
 SIGMA_M = 25.0
@@ -51,7 +51,7 @@ def measure(runs: int) -> dict[str, Any]:
     sides = {"ours": ours, "textbook loop": textbook}
     left_out = []
     if packed.INSTALLED:
-        sides[COMPILED] = compiled
+        sides[OURS[-1]] = compiled
     else:
         left_out.append("the compiled batch is left out: pip install 'talkdown[fast]'")
     for name, (side, module, package) in PEERS.items():

@@ -62,7 +62,7 @@ def turn_along(noise: Floats, course: Floats, share: Floats, most: Floats, uneve
     There shares (u,) of its sigma are left along the course, and shares (n, u), no less, across it. A course of 0, of what
     stands, leaves it alike.
     """
-    ways = turned(course, share, np.maximum(most, share))
+    ways = _turned(course, share, np.maximum(most, share))
     for mode, way in zip(uneven.tolist(), ways.transpose(1, 0, 2, 3), strict=True):
         of_mode = noise[:, mode]
         of_mode[:, _MOVING[:, None], _MOVING] = _along_both(of_mode[:, 0:4:3, 0:4:3], way)
@@ -92,10 +92,10 @@ def _along_both(parts: Floats, way: Floats) -> Floats:
 def usual(course: Floats, speed: Floats, held: Held) -> Floats:
     """Covariance (n, 2, 2) of an acceleration of which nothing is known, at courses (n, 2) and level speeds (n,)."""
     along = np.maximum(np.minimum(held.drag * speed * speed, held.across_mps2), held.along_mps2)
-    return held.across_mps2**2 * turned(course, (along / held.across_mps2)[:, None])[:, 0]
+    return held.across_mps2**2 * _turned(course, (along / held.across_mps2)[:, None])[:, 0]
 
 
-def turned(course: Floats, along: Floats, across: Floats | float = 1.0) -> Floats:
+def _turned(course: Floats, along: Floats, across: Floats | float = 1.0) -> Floats:
     """Variances (n, m, 2, 2) of which sigma is a share (m,) or (n, m) along the course and a share (n, m) across it."""
     way = course[:, None, :, None] * course[:, None, None, :]
     square = np.asarray(across * across)[..., None, None]

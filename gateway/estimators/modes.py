@@ -63,10 +63,10 @@ def begin(state: Estimate, modes: Modes) -> Mixture:
     mean, covariance = state.mean, state.covariance
     if modes.acceleration is not None:
         level = state.mean[:, 3:5]
-        speed = speed_of(level)
+        speed = _speed(level)
         mean, covariance = np.zeros((n, WIDE)), np.zeros((n, WIDE, WIDE))
         mean[:, :SIZE], covariance[:, :SIZE, :SIZE] = state.mean, state.covariance
-        covariance[:, SIZE:, SIZE:] = usual(course_of(level, speed), speed, modes.acceleration)
+        covariance[:, SIZE:, SIZE:] = usual(_course(level, speed), speed, modes.acceleration)
     return Mixture(
         np.repeat(mean[:, None], m, axis=1),
         np.repeat(covariance[:, None], m, axis=1),
@@ -118,11 +118,11 @@ def predict(mixture: Mixture, elapsed_s: Floats, modes: Modes, transition: Float
 def moved(mean: Floats, weight: Floats, elapsed_s: Floats, modes: Modes) -> tuple[Floats, Floats]:
     """Transition and noise (n, m, d, d) over times (n,) of modes that have mixed: means (n, m, d), weights (n, m)."""
     level = (weight[:, None, :] @ mean[:, :, 3:5])[:, 0]
-    speed = speed_of(level)
+    speed = _speed(level)
     rate = modes.turn_rate(speed)
     numbers, held = modes.numbers, modes.acceleration
     carry, noise = carried(numbers.shaken, elapsed_s, rate, SIZE if held is None else WIDE)
-    course = course_of(level, speed)
+    course = _course(level, speed)
     if len(numbers.uneven):
         slow = np.minimum(speed[:, None] * modes.turn_rate_rps / numbers.across, 1.0)
         turn_along(noise, course, numbers.along, slow, numbers.uneven)
@@ -131,12 +131,12 @@ def moved(mean: Floats, weight: Floats, elapsed_s: Floats, modes: Modes) -> tupl
     return carry, noise
 
 
-def speed_of(level: Floats) -> Floats:
+def _speed(level: Floats) -> Floats:
     """Lengths (n,) of level velocities (n, 2)."""
     return np.asarray(np.sqrt(level[:, 0] * level[:, 0] + level[:, 1] * level[:, 1]))
 
 
-def course_of(level: Floats, speed: Floats) -> Floats:
+def _course(level: Floats, speed: Floats) -> Floats:
     """Level velocities (n, 2) of lengths (n,) as directions of length 1; 0 of what stands."""
     return np.asarray(level / np.where(speed > 0.0, speed, np.inf)[:, None])
 

@@ -137,20 +137,21 @@ def follow(ensemble: Ensemble, model: Model) -> Followed:
     at_s, off, nees, nis, degrees = first.at_s, [], [], [], []
     for step in ensemble.steps[1:]:
         elapsed_s, at_s = np.full(runs, step.at_s - at_s), step.at_s
-        sigma = sigmas[step.radar]
         if batch is None:
             state = predict(state, elapsed_s, model.motion)
-            state, told = update(state, *_told(state.mean, step, sigma, model), ROBUST_SIGMA)
-            innovation, scatter = told.innovation, told.covariance
+            told = _told(state.mean, step, sigmas[step.radar], model)
+            state, found = update(state, *told, ROBUST_SIGMA)
+            innovation, scatter = found.innovation, found.covariance
         else:
             batch = batch.predict(elapsed_s)
-            batch, innovation, scatter = batch.update(*_told(batch.means, step, sigma, model), ROBUST_SIGMA)
+            told = _told(batch.means, step, sigmas[step.radar], model)
+            batch, innovation, scatter = batch.update(*told, ROBUST_SIGMA)
             state = batch.stated()
         wrong = state.mean[:, :axes] - step.true_enu_m[:axes]
         off.append(wrong)
         nees.append(_normalised(wrong, state.covariance[:, :axes, :axes]))
         nis.append(_normalised(innovation, scatter))
-        degrees.append(_measured(step).sum(axis=1))
+        degrees.append((~np.isnan(told[0][:: model.together])).sum(axis=1))
     times = np.array([step.at_s for step in ensemble.steps[1:]])
     return Followed(times, np.array(off), np.array(nees), np.array(nis), np.array(degrees))
 
@@ -171,11 +172,6 @@ def _told(means: Floats, step: Step, sigma: Floats, model: Model) -> tuple[Float
         return *told_by_plots(means, value, model.radars[step.radar]), variance
     velocity = np.repeat(step.velocity, model.together, axis=0)
     return *told_by_fixes(means, value, velocity, model), variance
-
-
-def _measured(step: Step) -> Bools:
-    """Which components a step measured of each run."""
-    return np.asarray(~np.isnan(step.value if step.radar else np.concatenate([step.value, step.velocity], axis=1)))
 
 
 def _normalised(off: Floats, covariance: Floats) -> Floats:

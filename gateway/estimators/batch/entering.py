@@ -24,9 +24,8 @@ from gateway.estimators.turning import (
     SWAY,
 )
 
-SHIFT, PUSH, LEFT = range(
-    19, 22
-)  # what an acceleration that lasts adds to position and velocity, and what is left of it
+# What an acceleration that lasts adds to position and velocity, and what is left of it.
+SHIFT, PUSH, LEFT = range(19, 22)
 ENTRIES = 22  # those of `turning`, and these
 
 
@@ -62,7 +61,7 @@ def entered(
 ) -> None:
     """The first 19 entries of a mode. `banked` is g times the tangent of the bank, `scale` (19,) what it is shaken by.
 
-    Each is a function of the angle, times a power of the time: see `turning.entries`.
+    Each is a function of the angle, times a power of the time: see `turning.carried`.
     """
     lanes = len(elapsed_s)
     shapes, powers = np.empty((SHAPES, lanes)), np.empty((4, lanes))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gateway.estimators.batch.entering import ENTRIES, LEFT, PUSH, SHIFT, entered, flown, turned, usual
+from gateway.estimators.batch.mixing import apart, mixed_from, put_back, summed
 from gateway.estimators.batch.packed import Bools, Floats, Ints, at, compiled
 from gateway.estimators.turning import (
     ACROSS,
@@ -69,127 +70,53 @@ def mixed_and_moved(
     way, drawn = np.empty((3, lanes)), np.empty((3, lanes))
     banked, least_rps, along_mps2, across_mps2, drag, share = set_of
     for b in range(blocks):
-        _apart(mean[b], covariance[b], off, spread)
+        apart(mean[b], covariance[b], off, spread)
         if anew:
-            _summed(weight[b], off, off[m])
-            _summed(weight[b], spread, spread[m])
+            summed(weight[b], off, off[m])
+            summed(weight[b], spread, spread[m])
         flown(weight[b], mean[b], speed, course)
         usual(course, speed, along_mps2, across_mps2, drag, drawn)
         whole[:] = 0.0
         noises[:] = 0.0
         for j in range(m):
-            _shares(weight[b], chance[b], j, shares, weight_after[b, j])
-            if anew:
-                _of_two(weight[b], chance[b], j, weight_after[b, j], off, spread, middle, mixed)
-            else:
-                _summed(shares, off, middle)
-                _summed(shares, spread, mixed)
-                _about_mean(middle, mixed)
-            for i in range(d):
-                for lane in range(lanes):
-                    middle[i, lane] += mean[b, 0, i, lane]
+            mixed_from(weight[b], chance[b], anew, j, weight_after[b, j], off, spread, shares, middle, mixed)
+            put_back(mean[b, 0], middle)
             entered(elapsed_s[b], speed, turn[j], banked, least_rps, fades[j], scale[j], shape, power, entries)
-            for p in range(3):
-                for lane in range(lanes):
-                    entries[SHIFT + p, lane] = response[b, p, lane] if holds[j] else 0.0
+            _lasting(response[b], holds[j], entries)
             turned(course, speed, along[j], across[j], least_rps, way)
             _moved_mean(middle, entries, mean_after[b, j])
             _noise(entries, way, drawn, grown[b], holds[j], noise, d)
             _moved(mixed, entries, noise, half, covariance_after[b, j], d)
-            for p in range(t):
-                for lane in range(lanes):
-                    noises[p, lane] += weight_after[b, j, lane] * noise[p, lane]
-            for p in range(ENTRIES):
-                for lane in range(lanes):
-                    whole[p, lane] += weight_after[b, j, lane] * entries[p, lane]
-        for i in range(d):
-            for c in range(i + 1):
-                if c < 6 or i > 8:  # of the source's error all of the noise
-                    for lane in range(lanes):
-                        noises[at(i, c), lane] *= share
+            _added(weight_after[b, j], noise, noises)
+            _added(weight_after[b, j], entries, whole)
+        _manoeuvres(noises, share, d)
         _moved(error[b], whole, noises, half, error_after[b], d)
 
 
 @compiled
-def _apart(mean: Floats, covariance: Floats, off: Floats, spread: Floats) -> None:
-    """Means as differences from the first mode's, and the second moments about that."""
-    lanes = mean.shape[-1]
-    m, d, _ = mean.shape
-    for i in range(m):
-        for r in range(d):
-            for lane in range(lanes):
-                off[i, r, lane] = mean[i, r, lane] - mean[0, r, lane]
-        for r in range(d):
-            for c in range(r + 1):
-                for lane in range(lanes):
-                    spread[i, at(r, c), lane] = covariance[i, at(r, c), lane] + off[i, r, lane] * off[i, c, lane]
+def _lasting(response: Floats, holds: bool, entries: Floats) -> None:
+    """The entries of an acceleration that lasts; 0 in modes that hold none."""
+    for p in range(3):
+        for lane in range(entries.shape[1]):
+            entries[SHIFT + p, lane] = response[p, lane] if holds else 0.0
 
 
 @compiled
-def _summed(share: Floats, parts: Floats, whole: Floats) -> None:
-    """Sums (p, L) of parts (m, p, L) in shares (m, L), two at a time: what takes long is fetching and storing."""
-    m, lanes = share.shape
-    for p in range(parts.shape[1]):
-        for lane in range(lanes):
-            whole[p, lane] = share[0, lane] * parts[0, p, lane]
-        for i in range(1, m - 1, 2):
-            for lane in range(lanes):
-                whole[p, lane] += share[i, lane] * parts[i, p, lane] + share[i + 1, lane] * parts[i + 1, p, lane]
-        if m % 2 == 0:
-            for lane in range(lanes):
-                whole[p, lane] += share[m - 1, lane] * parts[m - 1, p, lane]
+def _added(weight: Floats, part: Floats, whole: Floats) -> None:
+    """A mode's part (p, L) in what all have, by its weight."""
+    for p in range(len(part)):
+        for lane in range(len(weight)):
+            whole[p, lane] += weight[lane] * part[p, lane]
 
 
 @compiled
-def _shares(weight: Floats, chance: Floats, j: int, shares: Floats, after: Floats) -> None:
-    """The shares (m, L) of which mode j is made, and its weight after mixing."""
-    m, lanes = weight.shape
-    after[:] = 0.0
-    for i in range(m):
-        for lane in range(lanes):
-            shares[i, lane] = weight[i, lane] * chance[i, j, lane]
-            after[lane] += shares[i, lane]
-    for i in range(m):
-        for lane in range(lanes):
-            shares[i, lane] /= after[lane]
-
-
-@compiled
-def _of_two(
-    weight: Floats, chance: Floats, j: int, after: Floats, off: Floats, spread: Floats, middle: Floats, mixed: Floats
-) -> None:
-    """The same where who leaves any mode comes to mode j with one chance: mode j is made of what it was, and of all modes.
-
-    Off and spread (m + 1, ..., L) are the modes', and last those of all by their weights.
-    """
-    m, lanes = weight.shape
-    d = len(middle)
-    from_all, from_own = np.empty(lanes), np.empty(lanes)
-    for lane in range(lanes):
-        come = chance[(j + 1) % m, j, lane]
-        from_all[lane] = come / after[lane]
-        from_own[lane] = weight[j, lane] * (chance[j, j, lane] - come) / after[lane]
-    for r in range(d):
-        for lane in range(lanes):
-            middle[r, lane] = from_all[lane] * off[m, r, lane] + from_own[lane] * off[j, r, lane]
-        for c in range(r + 1):
-            p = at(r, c)
-            for lane in range(lanes):
-                mixed[p, lane] = (
-                    from_all[lane] * spread[m, p, lane]
-                    + from_own[lane] * spread[j, p, lane]
-                    - middle[r, lane] * middle[c, lane]
-                )
-
-
-@compiled
-def _about_mean(middle: Floats, mixed: Floats) -> None:
-    """Second moments (t, L) become covariances."""
-    d, lanes = middle.shape
-    for r in range(d):
-        for c in range(r + 1):
-            for lane in range(lanes):
-                mixed[at(r, c), lane] -= middle[r, lane] * middle[c, lane]
+def _manoeuvres(noises: Floats, share: float, d: int) -> None:
+    """Of the modes' noise the told error gets a share; of the source's error all."""
+    for i in range(d):
+        for c in range(i + 1):
+            if c < 6 or i > 8:
+                for lane in range(noises.shape[1]):
+                    noises[at(i, c), lane] *= share
 
 
 @compiled
